@@ -1,0 +1,110 @@
+"""A scene of the assignment: spheres and planes, one ambient light, a fixed camera and a fixed point light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from math import hypot
+from pathlib import Path
+from typing import TypeVar
+
+Triple = tuple[float, float, float]
+
+EYE: Triple = (0.0, 0.0, 0.0)
+SCREEN = 50.0  # half the width and height of the screen, centred on the z axis: x right, y up
+SCREEN_DISTANCE = 100.0  # from the eye along z, into the scene
+LIGHT: Triple = (500.0, 500.0, 500.0)  # white, without distance falloff
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """A sphere. Colour in levels (0..255), coefficients usually 0..1, `line` is its first line in the file."""
+
+    colour: Triple
+    centre: Triple
+    radius: float
+    diffuse: float
+    reflection: float
+    line: int = field(default=0, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """An infinite plane. The normal is kept as written, of any length; shading uses `unit_normal`."""
+
+    colour: Triple
+    point: Triple
+    normal: Triple
+    diffuse: float
+    reflection: float
+    line: int = field(default=0, compare=False)
+
+    @property
+    def unit_normal(self) -> Triple:
+        """The normal at unit length, safe for components from 1e-308 to 1e308; never flipped toward the viewer."""
+        largest = max(abs(value) for value in self.normal)
+        x, y, z = (value / largest for value in self.normal)
+        length = hypot(x, y, z)
+        return (x / length, y / length, z / length)
+
+
+Surface = TypeVar("Surface", Sphere, Plane)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What a scene file says: ambient colour (levels), ambient coefficient, spheres and planes in file order."""
+
+    ambient: Triple
+    ambient_coefficient: float
+    spheres: tuple[Sphere, ...] = ()
+    planes: tuple[Plane, ...] = ()
+
+    @staticmethod
+    def load(path: str | Path) -> Scene:
+        """Read a scene file. Raises SceneError; issues SceneWarning for unusual colours and coefficients."""
+        from reference.text import load
+
+        return load(path)
+
+    def render(self, show: bool = False) -> None:
+        """Draw the scene into `scene.jpg` in the working directory, as the document asks; `show` opens a window."""
+        from reference.image import show_window, write_image
+        from reference.tracer import render
+
+        levels = render(self)
+        write_image(Path("scene.jpg"), levels)
+        if show:
+            show_window(levels)
+
+
+def merge_coincident(scene: Scene) -> Scene:
+    """Drop every surface that occupies exactly the same points as an earlier one (first listed stays).
+
+    Compared on the decimals as written, without rounding. Planes coincide whichever way their normals point.
+    """
+    return replace(
+        scene,
+        spheres=_first_of_each(scene.spheres, [(sphere.centre, sphere.radius) for sphere in scene.spheres]),
+        planes=_first_of_each(scene.planes, [_plane_identity(plane) for plane in scene.planes]),
+    )
+
+
+def _first_of_each(surfaces: tuple[Surface, ...], identities: list[tuple[object, ...]]) -> tuple[Surface, ...]:
+    first: dict[tuple[object, ...], Surface] = {}
+    for identity, surface in zip(identities, surfaces, strict=True):
+        first.setdefault(identity, surface)
+    return tuple(first.values())
+
+
+def _plane_identity(plane: Plane) -> tuple[Fraction, ...]:
+    normal = [exact(value) for value in plane.normal]
+    leading = next(value for value in normal if value)
+    direction = [value / leading for value in normal]
+    offset = sum((a * exact(b) for a, b in zip(direction, plane.point, strict=True)), Fraction(0))
+    return (*direction, offset)
+
+
+def exact(value: float) -> Fraction:
+    """The decimal that was written for `value` (its shortest spelling), without rounding."""
+    return Fraction(repr(value))

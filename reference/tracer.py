@@ -1,0 +1,191 @@
+"""The tracer: a scene and a model become a picture, in one Dr.Jit kernel.
+
+Surfaces are one numbered list, spheres before planes. Up to `UNROLLED` of them the kernel is straight code over uniform
+values, one kernel for each pair of counts; beyond that it loops over the surfaces, one kernel for every scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from reference.device import Types, array_types
+from reference.errors import InputError
+from reference.model import DOCUMENT, Mask, Model, Number, Vector, Window
+from reference.scene import EYE, LIGHT, Scene
+
+UNROLLED = 16  # surfaces; beyond this, compile time outweighs what straight code gains
+BAND = 1 << 22  # pixels a kernel launch, which bounds the memory of large pictures
+NOTHING = 0xFFFFFFFF  # the index of no surface
+LARGEST_SIDE = 1 << 16  # pixels
+LARGEST_DEPTH = 1 << 20  # bounces
+
+
+def render(
+    scene: Scene,
+    model: Model = DOCUMENT,
+    *,
+    width: int = 1000,
+    height: int = 1000,
+    depth: int = 3,
+    precision: str = "double",
+    device: str = "auto",
+    dtype: DTypeLike = np.float32,
+) -> NDArray[Any]:
+    """The picture: height x width x 3, linear, in levels (0..255) that are not clamped, of type `dtype`.
+
+    `depth` counts the bounces after the primary hit; `precision` is that of the computation (double or single).
+    Raises InputError for a size or depth out of range and DeviceError where Dr.Jit cannot compute.
+    """
+    if not (0 < width <= LARGEST_SIDE and 0 < height <= LARGEST_SIDE):
+        raise InputError(f"expected a size of 1 to {LARGEST_SIDE} pixels a side, found {width}x{height}")
+    if not 0 <= depth <= LARGEST_DEPTH:
+        raise InputError(f"expected a depth of 0 to {LARGEST_DEPTH}, found {depth}")
+    world = World(scene, model, array_types(precision, device))
+    limit = dr.opaque(world.Index, depth)
+    picture = np.empty((height, width, 3), dtype)
+    rows = max(1, BAND // width)
+    for top in range(0, height, rows):
+        band = picture[top : top + rows]
+        direction = _camera_directions(world, width, height, top, len(band))
+        colour = dr.ravel(_radiance(world, direction, limit)).numpy()
+        band[:] = np.broadcast_to(colour.reshape(-1, 3), (len(band) * width, 3)).reshape(band.shape)  # constant if empty
+    return picture
+
+
+class World:
+    """A scene on the device: what the intersections and the shading read."""
+
+    def __init__(self, scene: Scene, model: Model, types: Types) -> None:
+        scene = model.surfaces(scene)
+        self.model = model
+        self.Float, self.Index, self.Mask = types.Float, types.Index, types.Mask
+        self.Vector, self.Packet = types.Vector3, types.Vector4
+        self.spheres, self.surfaces = len(scene.spheres), len(scene.spheres) + len(scene.planes)
+        geometry: list[tuple[float, ...]] = [(*s.centre, s.radius, 0, 0, 0, 0) for s in scene.spheres]
+        geometry += [(*p.point, 0, *p.unit_normal, 0) for p in scene.planes]
+        materials = [(*s.colour, s.diffuse, s.reflection, 0, 0, 0) for s in (*scene.spheres, *scene.planes)]
+        self.geometry, self.materials = self._table(geometry), self._table(materials)
+        self.uniform = [[self._uniform(value) for value in row] for row in geometry[: UNROLLED + 1]]
+        self.ambient = self.Vector(*map(self._uniform, scene.ambient))
+        self.ambient_coefficient = self._uniform(scene.ambient_coefficient)
+        self.light = self.Vector(*LIGHT)
+        self.first_plane = dr.opaque(self.Index, self.spheres)
+
+    def _uniform(self, value: float) -> Number:
+        """A number that is an input of the kernel, not a part of its code."""
+        return dr.opaque(self.Float, value)
+
+    def _table(self, rows: list[tuple[float, ...]]) -> Number:
+        return self.Float(np.array(rows or [(0.0,) * 8]).ravel())  # an empty scene still has something to gather
+
+    def gather(self, table: Number, packet: Number, active: Mask = True) -> Number:
+        return dr.gather(self.Packet, table, packet, active)
+
+    def fold(self, first: int, last: int, step: Callable[..., tuple[Number, ...]], state: tuple[Number, ...], going: Callable[..., Mask]) -> tuple[Number, ...]:
+        """Apply `state = step(index, row, *state)` to surfaces first..last-1, while a ray is still `going(*state)`."""
+        if self.surfaces <= UNROLLED:
+            for index in range(first, last):
+                state = step(self.Index(index), self.uniform[index], *state)
+            return state
+
+        def body(index: Number, *state: Number) -> tuple[Number, ...]:
+            head, tail = self.gather(self.geometry, 2 * index), self.gather(self.geometry, 2 * index + 1)
+            return (index + 1, *step(index, [*head, *tail], *state))
+
+        start, end = dr.opaque(self.Index, first), dr.opaque(self.Index, last)
+        return dr.while_loop((start, *state), lambda index, *state: (index < end) & going(*state), body)[1:]
+
+
+def _camera_directions(world: World, width: int, height: int, top: int, rows: int) -> Vector:
+    pixel = dr.arange(world.Index, rows * width)
+    across, down = dr.opaque(world.Index, width), dr.opaque(world.Index, height)
+    row = pixel // across
+    column = pixel - row * across
+    row += dr.opaque(world.Index, top)
+    return world.Vector(*world.model.camera_direction(*map(world.Float, (column, row, across, down))))
+
+
+@dr.syntax
+def _radiance(world: World, direction: Vector, limit: Number) -> Vector:
+    """The colour that each camera ray brings back, bounce by bounce."""
+    colour = world.Vector(0)
+    weight = world.Float(1)
+    depth = world.Index(0)
+    origin = world.Vector(*EYE)
+    t, hit = nearest(world, world.model.camera, origin, direction, world.Index(NOTHING), world.Mask(True))
+    while hit != NOTHING:
+        point = dr.fma(direction, t, origin)
+        head, tail = world.gather(world.geometry, 2 * hit), world.gather(world.geometry, 2 * hit + 1)
+        material, mirror = world.gather(world.materials, 2 * hit), world.gather(world.materials, 2 * hit + 1)
+        place, surface = world.Vector(head.x, head.y, head.z), world.Vector(material.x, material.y, material.z)
+        normal = dr.select(
+            hit < world.first_plane, world.model.sphere_normal(point, place, head.w), world.Vector(tail.x, tail.y, tail.z)
+        )
+        to_light = world.light - point
+        cosine = world.model.cosine(normal, to_light)
+        lit = (cosine != 0) & ~blocked(world, point, to_light, hit, cosine != 0)
+        local = world.model.ambient(surface, world.ambient, world.ambient_coefficient)
+        local += dr.select(lit, world.model.diffuse(surface, material.w, cosine), 0)
+        colour = dr.fma(local, weight, colour)
+
+        depth += 1
+        weight = world.model.reflected_weight(weight, mirror.x, depth)
+        origin = world.model.reflected_origin(point, normal)
+        direction = world.model.reflected_direction(direction, normal)
+        leaving = hit
+        hit = world.Index(NOTHING)
+        onward = (depth <= limit) & (weight != 0)
+        if onward:
+            t, hit = nearest(world, world.model.reflection, origin, direction, leaving, onward)
+    return colour
+
+
+def nearest(world: World, window: Window, origin: Vector, d: Vector, leaving: Number, active: Mask) -> tuple[Number, Number]:
+    """Distance and index of the first surface along each ray; on a tie the first listed."""
+    dd = dr.dot(d, d)
+
+    def closer(index: Number, t: Number, counts: Mask, best: Number, hit: Number) -> tuple[Number, Number]:
+        counts &= t < best
+        return dr.select(counts, t, best), dr.select(counts, index, hit)
+
+    def meet_sphere(index: Number, row: list[Number], best: Number, hit: Number) -> tuple[Number, Number]:
+        p, left = origin - world.Vector(*row[:3]), leaving == index
+        near, far = world.model.sphere_distances(p, d, dd, row[3], left)
+        t = dr.select(window.sphere(near, left), near, far)
+        return closer(index, t, window.sphere(t, left), best, hit)
+
+    def meet_plane(index: Number, row: list[Number], best: Number, hit: Number) -> tuple[Number, Number]:
+        normal, left = world.Vector(*row[4:7]), leaving == index
+        facing = dr.dot(d, normal)
+        t = world.model.plane_distance(world.Vector(*row[:3]) - origin, normal, facing, left)
+        return closer(index, t, window.plane(t, facing, left), best, hit)
+
+    state = (world.Float(dr.inf), world.Index(NOTHING))
+    state = world.fold(0, world.spheres, meet_sphere, state, lambda *_: active)
+    return world.fold(world.spheres, world.surfaces, meet_plane, state, lambda *_: active)
+
+
+def blocked(world: World, origin: Vector, d: Vector, leaving: Number, active: Mask) -> Mask:
+    """Whether any surface stands between each point and the light at t = 1."""
+    dd = dr.dot(d, d)
+
+    def meet_sphere(index: Number, row: list[Number], dark: Mask) -> tuple[Mask]:
+        p, left = origin - world.Vector(*row[:3]), leaving == index
+        near, far = world.model.sphere_distances(p, d, dd, row[3], left)
+        return (dark | world.model.shadow.sphere(near, left) | world.model.shadow.sphere(far, left),)
+
+    def meet_plane(index: Number, row: list[Number], dark: Mask) -> tuple[Mask]:
+        normal, left = world.Vector(*row[4:7]), leaving == index
+        facing = dr.dot(d, normal)
+        t = world.model.plane_distance(world.Vector(*row[:3]) - origin, normal, facing, left)
+        return (dark | world.model.shadow.plane(t, facing, left),)
+
+    dark = world.Mask(False)
+    (dark,) = world.fold(0, world.spheres, meet_sphere, (dark,), lambda dark: active & ~dark)
+    (dark,) = world.fold(world.spheres, world.surfaces, meet_plane, (dark,), lambda dark: active & ~dark)
+    return dark

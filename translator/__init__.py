@@ -1,0 +1,1 @@
+"""A scene becomes the files of another renderer, and those files its picture."""

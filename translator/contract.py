@@ -1,0 +1,63 @@
+"""What an adapter offers and what it may refuse.
+
+A renderer is one module in `translator/renderers`; its name there (`_` read as `-`) is the renderer's name. It has:
+
+    TITLE    the name people know
+    INSTALL  the line to type where it is missing
+    VERSION  (command, pattern): group 1 of the pattern in what the command prints is the version
+    TIMING   pattern: group 1 in the log of a run is the seconds that tracing alone took
+    export   (scene, settings) -> Export: pure, the same files for the same scene, with nothing installed.
+             Raises Unsupported for what the renderer cannot carry, before anything runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from reference.errors import CrossrayError
+from reference.scene import Scene
+
+PYTHON = "python"  # as the first word of a command: the Python that runs crossray
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The picture to draw, always by the `exact` convention."""
+
+    width: int = 1000
+    height: int = 1000
+    depth: int = 3  # bounces after the primary hit
+    threads: int = 2
+
+
+@dataclass(frozen=True)
+class Export:
+    """A scene in a renderer's own language.
+
+    `command` is run in a folder that holds `files` and leaves the picture `image` there: linear, levels / 255.
+    `notes` tell a reader what is not obvious about the files.
+    """
+
+    files: Mapping[str, str]
+    command: tuple[str, ...]
+    image: str
+    notes: tuple[str, ...] = ()
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+
+class Unsupported(CrossrayError):
+    """The renderer cannot carry this scene; reads as a sentence for the user."""
+
+
+class Adapter(Protocol):
+    """The shape of a renderer's module."""
+
+    TITLE: str
+    INSTALL: str
+    VERSION: tuple[tuple[str, ...], str]
+    TIMING: str
+
+    @staticmethod
+    def export(scene: Scene, settings: Settings) -> Export: ...

@@ -1,0 +1,119 @@
+"""POV-Ray: the scene in its scene description language, exactly, diffuse seen from behind and near cut included."""
+
+from __future__ import annotations
+
+from reference.scene import LIGHT, SCREEN, SCREEN_DISTANCE, Plane, Scene, Sphere, Triple, merge_coincident
+from translator.contract import Export, Settings, Unsupported
+
+TITLE = "POV-Ray"
+INSTALL = "apt-get install povray"
+VERSION = (("povray", "--version"), r"POV-Ray (\d[\w.]*)")
+TIMING = r"Trace Time:.*\(([0-9.]+) seconds\)"
+
+UNIT = 0.1  # POV-Ray's tolerances are absolute (1e-4 for reflections, 1e-3 for shadows) and suit this scale
+DEEPEST = 255  # bounces: max_trace_level stops at 256
+FARTHEST = 1e7 / UNIT  # POV-Ray ignores hits beyond 1e7 of its units
+
+HEADER = """\
+// {title}
+// Run: {command}
+// The colours are linear: no gamma. Coordinates are the assignment's, times Unit.
+#version 3.7;
+#declare Unit = {unit};
+
+global_settings {{
+  assumed_gamma 1.0
+  max_trace_level {levels}  // the primary ray and {depth} bounces
+  adc_bailout 0             // no bounce is dropped for being faint
+  ambient_light rgb {ambient}  // ambient colour * coefficient / 256
+}}
+background {{ rgb 0 }}
+camera {{
+  perspective
+  location 0
+  direction {distance}*z
+  up {side}*y
+  right {side}*x
+}}
+light_source {{ {light}*Unit, rgb 1 }}
+"""
+
+
+def export(scene: Scene, settings: Settings) -> Export:
+    """One `.pov` file. Each surface: ambient and diffuse from its colour, the given normal on both sides, a mirror."""
+    scene = merge_coincident(scene)
+    _refuse(scene, settings)
+    size = (f"+W{settings.width}", f"+H{settings.height}")
+    exactly = ("-A", "-D", "-P", "+FN16", "File_Gamma=1.0", f"+WT{settings.threads}")
+    command = ("povray", "+Iscene.pov", "+Oscene.png", *size, *exactly)
+    header = HEADER.format(
+        title="A scene of the recursive ray tracing assignment, for POV-Ray 3.7",
+        command=" ".join(command),
+        unit=UNIT,
+        levels=settings.depth + 1,
+        depth=settings.depth,
+        ambient=_vector(tuple(value * scene.ambient_coefficient / 256 for value in scene.ambient)),
+        distance=SCREEN_DISTANCE,
+        side=2 * SCREEN,
+        light=_vector(LIGHT),
+    )
+    parts = [header]
+    parts += [_sphere(number, sphere) for number, sphere in enumerate(scene.spheres, 1)]
+    parts += [_plane(number, plane) for number, plane in enumerate(scene.planes, 1)]
+    notes = ("The picture is a 16 bit PNG with linear values; viewers that honour its gamma show it brighter.",)
+    return Export({"scene.pov": "\n".join(parts)}, command, "scene.png", notes)
+
+
+def _refuse(scene: Scene, settings: Settings) -> None:
+    if settings.depth > DEEPEST:
+        raise Unsupported(f"POV-Ray follows at most {DEEPEST} bounces, not {settings.depth}")
+    for number, sphere in enumerate(scene.spheres, 1):
+        if max(map(abs, sphere.centre)) + sphere.radius > FARTHEST:
+            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: sphere {number} reaches farther")
+    for number, plane in enumerate(scene.planes, 1):
+        if abs(_offset(plane)) > FARTHEST / 3:  # slanting rays go farther
+            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: plane {number} lies too far from the eye")
+
+
+def _sphere(number: int, sphere: Sphere) -> str:
+    shape = f"sphere {{ {_vector(sphere.centre)}*Unit, {sphere.radius!r}*Unit"
+    return _object(f"sphere {number}", shape, sphere, near=sphere.centre[2] - sphere.radius <= SCREEN_DISTANCE)
+
+
+def _plane(number: int, plane: Plane) -> str:
+    normal, offset = plane.unit_normal, _offset(plane)
+    middle = SCREEN_DISTANCE * normal[2]  # n.d over the screen is middle -+ spread; the plane is met at offset / n.d
+    spread = SCREEN * (abs(normal[0]) + abs(normal[1]))
+    near = middle + spread >= offset if offset > 0 else middle - spread <= offset
+    return _object(f"plane {number}", f"plane {{ {_vector(normal)}, {offset!r}*Unit", plane, near)
+
+
+def _object(name: str, shape: str, surface: Sphere | Plane, near: bool) -> str:
+    """One object; where camera rays can meet it before the screen, one for the camera and one for all other rays."""
+    texture = _texture(surface)
+    if not near:
+        return f"// {name}\n{shape}\n{texture}}}\n"
+    clip = f"  clipped_by {{ plane {{ -z, -{SCREEN_DISTANCE}*Unit }} }}  // the camera sees nothing before the screen\n"
+    return (
+        f"// {name}, as the camera sees it\n{shape}\n{texture}{clip}  no_shadow no_reflection\n}}\n"
+        f"// {name}, as shadows and mirrors see it\n{shape}\n{texture}  no_image\n}}\n"
+    )
+
+
+def _texture(surface: Sphere | Plane) -> str:
+    """The pair `diffuse front, back` swapped for the inside: the given normal shades both sides."""
+    pigment = f"pigment {{ rgb {_vector(surface.colour)}/255 }}"
+    outside, inside = _finish(repr(surface.diffuse), surface), _finish(f"0, {surface.diffuse!r}", surface)
+    return f"  texture {{ {pigment} {outside} }}\n  interior_texture {{ {pigment} {inside} }}\n"
+
+
+def _finish(diffuse: str, surface: Sphere | Plane) -> str:
+    return f"finish {{ ambient 1 diffuse {diffuse} specular 0 phong 0 reflection {{ {surface.reflection!r} }} }}"
+
+
+def _offset(plane: Plane) -> float:
+    return sum(a * b for a, b in zip(plane.unit_normal, plane.point, strict=True))
+
+
+def _vector(values: Triple | tuple[float, ...]) -> str:
+    return f"<{', '.join(map(repr, values))}>"
