@@ -101,3 +101,18 @@ def _missing(device: str) -> str:
     if device == "gpu":
         return "no CUDA graphics card that Dr.Jit can use; use --device cpu"
     return f"Dr.Jit found no LLVM that works on this machine; install one: pip install {LLVM_PACKAGE}"
+
+
+def describe() -> list[tuple[str, bool, str]]:
+    """For each part of the native tracer: its name, whether it works, and what is there or what to do."""
+    import drjit
+
+    rows = [("Dr.Jit", True, drjit.__version__)]
+    try:
+        array_types(device="cpu")
+        rows.append(("processor", True, f"LLVM from {os.environ.get(LLVM_VARIABLE) or 'the system'}"))
+    except DeviceError as error:
+        rows.append(("processor", False, str(error)))
+    has_card = drjit.has_backend(drjit.JitBackend.CUDA)
+    rows.append(("graphics card", True, "CUDA, used by default" if has_card else "none; the processor is used"))
+    return rows

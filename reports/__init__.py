@@ -1,0 +1,1 @@
+"""Recorded pictures become numbers, verdicts and pages."""

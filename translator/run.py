@@ -171,4 +171,5 @@ def _kill_group(process: subprocess.Popen[bytes]) -> None:
 def _tail(path: Path) -> str:
     with open(path, "rb") as file:
         file.seek(max(0, file.seek(0, os.SEEK_END) - KEPT_LOG))
-        return file.read().decode("utf-8", "replace").replace("\r", "\n")
+        text = file.read().decode("utf-8", "replace").replace("\r\n", "\n")
+    return re.sub(r"[^\n]*\r", "", text)  # progress that was drawn over

@@ -1,0 +1,63 @@
+# `make report` and `make test` do all set-up on a fresh Debian 12; nothing needs to be installed by hand.
+
+VENV := .venv
+PYTHON ?= python3
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.DEFAULT_GOAL := help
+.PHONY: help report test lint bench pictures lock renderers browser clean
+
+help:  ## Say what can be made
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+report: $(READY) renderers  ## Draw the four examples in every renderer there is and write out/report.html
+	@$(BIN)/crossray check --out out || test $$? -eq 1  # 1: the report is written and something disagrees
+
+test: $(READY) renderers browser lint  ## Check style and types, run the tests
+	$(BIN)/python -m pytest
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(READY) renderers  ## Time the tracer beside POV-Ray and print the ratios
+	$(BIN)/python tests/benchmarks/peers.py
+
+pictures: $(READY)  ## Draw the pictures of the README
+	$(BIN)/python docs/pictures.py
+
+lock: $(READY)  ## Pin the newest versions of all dependencies, with hashes
+	$(BIN)/pip-compile --quiet --upgrade --generate-hashes --allow-unsafe --strip-extras --extra dev --no-header \
+		--no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-emit-options \
+		--output-file requirements.txt pyproject.toml
+
+$(READY): requirements.txt pyproject.toml
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || $(call debian,python3-venv python3-pip,python3 -c "import ensurepip",required)
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --require-hashes --only-binary :all: -r requirements.txt
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+renderers:
+	@command -v povray >/dev/null || $(call debian,povray,povray)
+
+browser:
+	@command -v chromium >/dev/null || $(call debian,chromium,chromium)
+
+# Install Debian packages $(1) that provide the program $(2) where that is allowed, else say the line to type and go on;
+# in continuous integration, and where $(3) is given, a missing one is a failure.
+define debian
+{ if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	echo "installing $(1)"; \
+	{ apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends $(1); } >/dev/null; \
+  fi; \
+  $(if $(3),$(2),command -v $(2)) >/dev/null 2>&1 || { \
+	echo "missing: $(1). To install: sudo apt-get install $(1)" >&2; \
+	$(if $(3),false,[ "$$CI" != true ]); }; }
+endef
+
+clean:  ## Remove what was made
+	rm -rf $(VENV) out export dist build

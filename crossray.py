@@ -1,0 +1,426 @@
+"""The command line: the only file that knows all three packages, and the one that turns errors into exit codes."""
+
+from __future__ import annotations
+
+import enum
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from reference.errors import CrossrayError, FailureError, InputError, SceneWarning
+from reference.scene import Scene
+
+if TYPE_CHECKING:
+    from translator.contract import Settings
+
+DONE, DISAGREES, BAD_INPUT, NOT_DONE, INTERRUPTED = 0, 1, 2, 3, 130
+SHOWN_WARNINGS = 20
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Draw the ray tracing assignment's scenes, here and in other renderers, and compare the pictures.",
+)
+
+
+class Convention(enum.StrEnum):
+    """The three readings of the assignment."""
+
+    document = "document"
+    published = "published"
+    exact = "exact"
+
+
+class Precision(enum.StrEnum):
+    """What the tracer computes in."""
+
+    double = "double"
+    single = "single"
+
+
+class Device(enum.StrEnum):
+    """Where the tracer computes."""
+
+    auto = "auto"
+    cpu = "cpu"
+    gpu = "gpu"
+
+
+@dataclass(frozen=True)
+class Size:
+    """Width and height in pixels, as in 1000x1000."""
+
+    width: int
+    height: int
+
+    @staticmethod
+    def parse(text: object) -> Size:
+        """From a word on the command line, or a default."""
+        width, _, height = str(text).lower().partition("x")
+        if not (width.isascii() and width.isdigit() and height.isascii() and height.isdigit()):
+            raise typer.BadParameter(f"expected a size like 1000x1000, found {text!r}")
+        return Size(int(width), int(height))
+
+    def __str__(self) -> str:
+        return f"{self.width}x{self.height}"
+
+
+class NamesCommand(TyperCommand):
+    """Lets `--with` and `--to` take several renderers at once: the names that follow them, apart or with commas."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:
+        from translator.registry import renderer_names
+
+        known, spread = set(renderer_names()), []
+        option = None
+        for position, word in enumerate(args):
+            if word == "--":
+                spread += args[position:]
+                break
+            if option and (word in known or args[position - 1] == option):
+                for name in word.split(","):
+                    spread += [option, name]
+                continue
+            option = word if word in ("--with", "--to") else None
+            if not option:
+                spread.append(word)
+        if args and args[-1] in ("--with", "--to"):
+            spread.append(args[-1])
+        return super().parse_args(ctx, spread)
+
+
+SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or - for standard input.")]
+SizeOption = Annotated[
+    Size, typer.Option("--size", parser=Size.parse, metavar="WxH", help="Pixels across and down.")
+]
+DepthOption = Annotated[int, typer.Option("--depth", help="Bounces after the primary hit.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but results and errors.")]
+VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="Say more about what is being done.")]
+TimeoutOption = Annotated[float, typer.Option("--timeout", min=1, help="Seconds that a renderer may take.")]
+SQUARE = Size(1000, 1000)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"crossray {_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None: ...
+
+
+@app.command()
+def render(
+    scene: SceneArgument,
+    output: Annotated[Path, typer.Option("--output", "-o", help="JPEG, PNG or EXR.")] = Path("scene.jpg"),
+    size: SizeOption = SQUARE,
+    depth: DepthOption = 3,
+    convention: Annotated[Convention, typer.Option(help="Which reading of the assignment.")] = Convention.document,
+    precision: Annotated[Precision, typer.Option(help="What to compute in.")] = Precision.double,
+    device: Annotated[Device, typer.Option(help="Where to compute.")] = Device.auto,
+    show: Annotated[bool, typer.Option("--show", help="Show the picture in a window.")] = False,
+    time: Annotated[bool, typer.Option("--time", help="Trace once more and print how long that takes.")] = False,
+    quiet: QuietOption = False,
+    verbose: VerboseOption = False,
+) -> None:
+    """Draw one scene.
+
+    \b
+    crossray render scenes/example1.txt
+    crossray render scenes/example1.txt -o picture.exr --size 500x500 --convention exact
+    """
+    from reference.image import check_format, show_window, write_image
+
+    check_format(output)
+    loaded = _load(scene, quiet)
+    from reference.device import provide_llvm
+
+    provide_llvm()
+    from reference.model import CONVENTIONS
+    from reference.tracer import render as trace
+
+    model = CONVENTIONS[convention.value]
+    options: dict[str, Any] = {"depth": depth, "precision": precision.value, "device": device.value}
+    levels = trace(loaded, model, width=size.width, height=size.height, dtype=float, **options)
+    write_image(output, levels)
+    _say(f"{output}: {size}, {convention.value}, {precision.value} precision", quiet or not verbose)
+    if time:
+        start = perf_counter()
+        trace(loaded, model, width=size.width, height=size.height, dtype=float, **options)
+        print(f"traced in {perf_counter() - start:.4f} s, without start-up, compilation and files", file=sys.stderr)
+    if show:
+        show_window(levels)
+
+
+@app.command(cls=NamesCommand)
+def export(
+    scene: SceneArgument,
+    output: Annotated[Path, typer.Option("--output", "-o", help="A folder; each renderer gets one in it.")] = Path(
+        "export"
+    ),
+    to: Annotated[list[str] | None, typer.Option("--to", metavar="RENDERER ...", help="Default: all.")] = None,
+    size: SizeOption = SQUARE,
+    depth: DepthOption = 3,
+    quiet: QuietOption = False,
+    verbose: VerboseOption = False,
+) -> None:
+    """Write a ready-to-run scene for other renderers and print the line that runs each.
+
+    \b
+    crossray export scenes/example1.txt -o export --to povray mitsuba
+    """
+    import shlex
+
+    from translator.contract import Unsupported
+    from translator.registry import NATIVE, adapter, renderer_names
+    from translator.run import command_line, write_export
+
+    loaded, settings = _load(scene, quiet), _settings(size, depth)
+    adapters = {name: adapter(name) for name in to or [name for name in renderer_names() if name != NATIVE]}
+    refused = 0
+    for name, renderer in adapters.items():
+        try:
+            exported = renderer.export(loaded, settings)
+        except Unsupported as reason:
+            refused += 1
+            print(f"{name}: not exported: {reason}", file=sys.stderr)
+            continue
+        write_export(exported, output / name)
+        print(f"cd {shlex.quote(str(output / name))} && {command_line(exported)}")
+        for note in exported.notes if verbose else ():
+            print(f"{name}: {note}", file=sys.stderr)
+    if refused and refused == len(adapters):
+        raise FailureError("no renderer can carry this scene")
+
+
+@app.command(cls=NamesCommand)
+def check(
+    scenes: Annotated[
+        list[str] | None, typer.Argument(metavar="[SCENE ...]", help="Scene files; default: the four examples.")
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", help="The folder for the report and the pictures.")] = Path("out"),
+    renderers: Annotated[
+        list[str] | None, typer.Option("--with", metavar="RENDERER ...", help="Default: all that there are.")
+    ] = None,
+    size: SizeOption = SQUARE,
+    depth: DepthOption = 3,
+    timeout: TimeoutOption = 600,
+    quiet: QuietOption = False,
+    verbose: VerboseOption = False,
+) -> None:
+    """Draw scenes in every renderer, compare the pictures with the exact one, and write a report.
+
+    \b
+    crossray check
+    crossray check homework.txt --with povray --out out/homework
+    """
+    from reference.text import dump
+    from reports.recording import Recording
+    from reports.writing import write_reports
+    from translator.registry import NATIVE, adapter, renderer_names
+    from translator.run import run_renderer
+
+    names = [name for name in dict.fromkeys(renderers or renderer_names()) if name != NATIVE]
+    for name in names:
+        adapter(name)
+    loaded = [(path, _load(path, quiet)) for path in scenes or _examples()]
+    settings = _settings(size, depth)
+    run = Recording(out, _version())
+    with _progress(quiet, verbose, len(loaded) * (2 * len(names) + 1)) as advance:
+        for path, scene in loaded:
+            entry = run.add_scene(path, size.width, size.height, depth=depth, convention="exact", text=dump(scene))
+            for name in (NATIVE, *names):
+                advance(f"{entry['scene']}: {name}")
+                outcome = run_renderer(name, scene, settings, timeout)
+                facts = {key: value for key, value in vars(outcome).items() if key != "picture"}
+                run.add_picture(entry, facts, outcome.picture)
+        results = write_reports(out, advance)
+    raise typer.Exit(_conclude(results, out, quiet, required=renderers or []))
+
+
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(help="The picture that is right.")],
+    b: Annotated[Path, typer.Argument(help="The picture to compare with it.")],
+    out: Annotated[Path | None, typer.Option("--out", help="A folder for a report.")] = None,
+    quiet: QuietOption = False,
+    verbose: VerboseOption = False,
+) -> None:
+    """Compare two pictures of the same size.
+
+    \b
+    crossray compare right.png mine.png --out out/mine
+    """
+    from reference.image import read_image
+    from reports.metrics import measure
+    from reports.recording import Recording
+    from reports.writing import write_reports
+
+    right, other = read_image(a), read_image(b)
+    if right.shape != other.shape:
+        sizes = [f"{picture.shape[1]}x{picture.shape[0]}" for picture in (right, other)]
+        raise InputError(f"{b}:1:1: expected a picture of {sizes[0]} like {a}, found {sizes[1]}")
+    measured = measure(right, other)
+    print(measured.as_text())
+    if out:
+        run = Recording(out, _version())
+        entry = run.add_scene(str(b), right.shape[1], right.shape[0], depth=None, convention=None, text=None)
+        for renderer, path, levels in (("reference", a, right), ("picture", b, other)):
+            run.add_picture(entry, run.picture_file(renderer, path), levels)
+        write_reports(out)
+        _say(f"{out / 'report.html'}", quiet)
+    raise typer.Exit(DISAGREES if measured.over["0.5"] else DONE)
+
+
+@app.command()
+def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
+    """Say what is installed, what works, and what to do about the rest.
+
+    \b
+    crossray doctor
+    """
+    from reference.device import describe
+    from translator.registry import adapter, renderer_names
+    from translator.run import installed_version
+
+    healthy = True
+    for name, fine, text in describe():
+        healthy &= fine
+        print(f"{'works' if fine else 'BROKEN'}   {name}: {text}")
+    for name in renderer_names():
+        version = installed_version(name)
+        renderer = adapter(name)
+        state, text = ("works  ", f"{renderer.TITLE} {version}") if version else ("missing", renderer.INSTALL)
+        print(f"{state} {name}: {text}")
+    raise typer.Exit(DONE if healthy else NOT_DONE)
+
+
+def main() -> None:
+    """The console script."""
+    try:
+        app()
+    except InputError as error:
+        _fail(str(error), BAD_INPUT)
+    except CrossrayError as error:
+        _fail(str(error), NOT_DONE)
+    except MemoryError:
+        _fail("there is not enough memory for this", NOT_DONE)
+    except KeyboardInterrupt:
+        _fail("interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(NOT_DONE)
+    except Exception:
+        import traceback
+
+        traceback.print_exc()
+        _fail("this is a mistake in crossray, please report it", NOT_DONE)
+
+
+def _load(path: str, quiet: bool) -> Scene:
+    """Read a scene; warnings go to standard error."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SceneWarning)
+        scene = Scene.load(path)
+    for warning in caught[:SHOWN_WARNINGS]:
+        _say(f"warning: {warning.message}", quiet)
+    if len(caught) > SHOWN_WARNINGS:
+        _say(f"warning: and {len(caught) - SHOWN_WARNINGS} more", quiet)
+    return scene
+
+
+def _examples() -> list[str]:
+    """The document's four scenes, from the checkout or from the installed package."""
+    here = Path(__file__).resolve().parent
+    for folder in (here / "scenes", here / "reference" / "scenes"):
+        if examples := sorted(folder.glob("example?.txt")):
+            return [os.path.relpath(path) if folder == here / "scenes" else str(path) for path in examples]
+    raise InputError("the example scenes are missing from this installation; name the scenes to check")
+
+
+def _settings(size: Size, depth: int) -> Settings:
+    from translator.contract import Settings
+
+    return Settings(size.width, size.height, depth, threads=os.cpu_count() or 1)
+
+
+def _conclude(results: dict[str, Any], out: Path, quiet: bool, required: list[str]) -> int:
+    """Print a line for each comparison; the exit code of a check."""
+    from reports.page import outcome
+
+    code = DONE
+    for scene in results["scenes"]:
+        if scene["reference"]["status"] != "rendered":
+            print(f"{scene['scene']}  native  {scene['reference']['status']}: {scene['reference']['reason']}")
+            code = NOT_DONE
+        for picture in scene["comparisons"]:
+            word = outcome(picture)
+            pixels, error = picture["pixels"], (picture["metrics"] or {}).get("max_error", 0)
+            found = f"{pixels['unexplained']} of {pixels['total']} pixels differ, by at most {error:.3g} levels" if pixels else picture["reason"]
+            print(f"{scene['scene']}  {picture['renderer']}  {word}: {found}")
+            if word == "failed" or (word == "not-installed" and picture["renderer"] in required):
+                code = NOT_DONE
+            elif word == "disagree":
+                code = max(code, DISAGREES)
+    _say(f"{out / 'report.html'}", quiet)
+    return code
+
+
+@contextmanager
+def _progress(quiet: bool, verbose: bool, total: int) -> Iterator[Callable[[str], None]]:
+    """A bar on a terminal; elsewhere a line for each step, if asked for."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda text: _say(text, quiet or not verbose)
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=total)
+        begun = False
+
+        def advance(text: str) -> None:
+            nonlocal begun
+            bar.update(task, description=escape(text), advance=int(begun))
+            begun = True
+
+        yield advance
+
+
+def _say(text: str, quiet: bool = False) -> None:
+    if not quiet:
+        print(text, file=sys.stderr)
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("crossray")
+
+
+def _fail(message: str, code: int) -> None:
+    print(message, file=sys.stderr)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

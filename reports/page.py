@@ -1,0 +1,70 @@
+"""The report as one HTML file that needs no network: a pure function of the results and the pictures of a run."""
+
+from __future__ import annotations
+
+import base64
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from reports.metrics import SETTINGS, THRESHOLDS, TOLERANCE
+from reports.results import AMPLIFIED
+
+ORDER = {"failed": 0, "disagree": 1, "not-installed": 2, "unsupported": 3, "agree": 4}  # worst first
+
+
+def page(folder: Path, results: dict[str, Any]) -> str:
+    """HTML for the results of the run in `folder`, worst scene and worst comparison first."""
+    environment = Environment(
+        loader=PackageLoader("reports", "assets"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.filters |= {"number": _number, "seconds": _seconds}
+    scenes = [{**scene, "comparisons": sorted(scene["comparisons"], key=_badness)} for scene in results["scenes"]]
+    scenes.sort(key=lambda scene: min(map(_badness, [scene["reference"], *scene["comparisons"]])))
+    return environment.get_template("report.html").render(
+        results=results,
+        scenes=scenes,
+        outcome=outcome,
+        embed=lambda name: _embed(folder, name),
+        settings=SETTINGS,
+        thresholds=[f"{level:g}" for level in THRESHOLDS],
+        tolerance=TOLERANCE,
+        amplified=AMPLIFIED,
+        style=_asset("report.css"),
+        script=_asset("report.js"),
+    )
+
+
+def outcome(picture: dict[str, Any]) -> str:
+    """One word for one picture: its verdict, or why it has none; `agree` for a reference that was drawn."""
+    if picture["status"] != "rendered":
+        return str(picture["status"])
+    return str(picture.get("verdict") or "agree")
+
+
+def _badness(picture: dict[str, Any]) -> tuple[int, int, float]:
+    """Sorts worst first; of equal verdicts the more pixels, then the larger error."""
+    unexplained = (picture.get("pixels") or {}).get("unexplained", 0)
+    largest = (picture.get("metrics") or {}).get("max_error", 0)
+    return ORDER[outcome(picture)], -unexplained, -largest
+
+
+def _embed(folder: Path, name: str) -> str:
+    return "data:image/png;base64," + base64.b64encode((folder / f"{name}.png").read_bytes()).decode("ascii")
+
+
+def _asset(name: str) -> str:
+    return resources.files("reports").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def _number(value: float | None) -> str:
+    """Six significant digits, or a dash for what is not defined."""
+    return "–" if value is None else f"{value:.6g}"
+
+
+def _seconds(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value * 1000:.1f} ms" if value < 1 else f"{value:.2f} s"

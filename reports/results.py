@@ -1,0 +1,76 @@
+"""A recorded run becomes numbers and verdicts: the content of report.json."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.image import read_image, write_image
+from reports.metrics import TOLERANCE, Measurement, error_map, measure
+from reports.recording import read_run
+
+AMPLIFIED = 32  # the difference picture: 8 levels of error are white
+WORST = 50  # pixels listed for each comparison
+
+
+def judge(folder: Path, progress: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
+    """Compare every picture of the run in `folder` with its scene's reference; writes the difference pictures there.
+
+    Returns the content of report.json. Raises InputError where the folder holds no run.
+    """
+    run = read_run(folder)
+    return {**run, "scenes": [_judge_scene(folder, entry, progress) for entry in run["scenes"]]}
+
+
+def _judge_scene(folder: Path, entry: dict[str, Any], progress: Callable[[str], None]) -> dict[str, Any]:
+    reference, *others = entry["pictures"]
+    truth = read_image(folder / f"{reference['image']}.exr") if reference["image"] else None
+    comparisons = []
+    for picture in others:
+        progress(f"{entry['scene']}: comparing {picture['renderer']}")
+        comparisons.append(_compare(folder, truth, picture))
+    scene = {key: value for key, value in entry.items() if key != "pictures"}
+    seconds = reference["seconds"] if reference["trace_seconds"] is None else reference["trace_seconds"]
+    return {**scene, "seconds": seconds, "reference": reference, "comparisons": comparisons}
+
+
+def _compare(folder: Path, truth: NDArray[Any] | None, picture: dict[str, Any]) -> dict[str, Any]:
+    result = {**picture, "verdict": None, "metrics": None, "pixels": None, "over": None, "worst": [], "difference": None}
+    if truth is None or picture["image"] is None:
+        return result
+    levels = read_image(folder / f"{picture['image']}.exr")
+    measured = measure(truth, levels)
+    error = error_map(truth, levels)
+    difference = f"{picture['image']}-difference"
+    write_image(folder / f"{difference}.png", np.abs(np.clip(truth, 0, 255) - np.clip(levels, 0, 255)) * AMPLIFIED)
+    pixels = _account(measured)
+    return {
+        **result,
+        "verdict": "disagree" if pixels["unexplained"] else "agree",
+        "metrics": measured.metrics(),
+        "places": {"ssim_min": measured.ssim_min_at, "max_error": measured.max_error_at},
+        "pixels": pixels,
+        "over": measured.over,
+        "worst": _worst(error),
+        "difference": difference,
+    }
+
+
+def _account(measured: Measurement) -> dict[str, Any]:
+    """Every pixel in one class; no difference is explained yet."""
+    wrong = measured.over[f"{TOLERANCE:g}"]
+    return {"total": measured.total, "agree": measured.total - wrong, "explained": {}, "unexplained": wrong}
+
+
+def _worst(error: NDArray[np.float64]) -> list[dict[str, Any]]:
+    """The pixels that do not agree, largest error first; of equal ones the topmost, then leftmost."""
+    rows, columns = np.nonzero(error > TOLERANCE)
+    order = np.lexsort((columns, rows, -error[rows, columns]))[:WORST]
+    return [
+        {"column": int(columns[i]), "row": int(rows[i]), "error": round(float(error[rows[i], columns[i]]), 3)}
+        for i in order
+    ]
