@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 DONE, DISAGREES, BAD_INPUT, NOT_DONE, INTERRUPTED = 0, 1, 2, 3, 130
 SHOWN_WARNINGS = 20
+TIMED_RUNS = 5
 
 app = typer.Typer(
     add_completion=False,
@@ -80,7 +82,8 @@ class Size:
 class NamesCommand(TyperCommand):
     """Lets `--with` and `--to` take several renderers at once: the names that follow them, apart or with commas."""
 
-    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat the option before each of the names."""
         from translator.registry import renderer_names
 
         known, spread = set(renderer_names()), []
@@ -102,9 +105,7 @@ class NamesCommand(TyperCommand):
 
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or - for standard input.")]
-SizeOption = Annotated[
-    Size, typer.Option("--size", parser=Size.parse, metavar="WxH", help="Pixels across and down.")
-]
+SizeOption = Annotated[Size, typer.Option("--size", parser=Size.parse, metavar="WxH", help="Pixels across and down.")]
 DepthOption = Annotated[int, typer.Option("--depth", help="Bounces after the primary hit.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but results and errors.")]
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="Say more about what is being done.")]
@@ -136,7 +137,7 @@ def render(
     precision: Annotated[Precision, typer.Option(help="What to compute in.")] = Precision.double,
     device: Annotated[Device, typer.Option(help="Where to compute.")] = Device.auto,
     show: Annotated[bool, typer.Option("--show", help="Show the picture in a window.")] = False,
-    time: Annotated[bool, typer.Option("--time", help="Trace once more and print how long that takes.")] = False,
+    time: Annotated[bool, typer.Option("--time", help="Trace a few times more and print how long that takes.")] = False,
     quiet: QuietOption = False,
     verbose: VerboseOption = False,
 ) -> None:
@@ -162,9 +163,12 @@ def render(
     write_image(output, levels)
     _say(f"{output}: {size}, {convention.value}, {precision.value} precision", quiet or not verbose)
     if time:
-        start = perf_counter()
-        trace(loaded, model, width=size.width, height=size.height, dtype=float, **options)
-        print(f"traced in {perf_counter() - start:.4f} s, without start-up, compilation and files", file=sys.stderr)
+        runs = []
+        for _ in range(TIMED_RUNS):
+            start = perf_counter()
+            trace(loaded, model, width=size.width, height=size.height, dtype=float, **options)
+            runs.append(perf_counter() - start)
+        print(f"traced in {median(runs):.4f} s, the median of {TIMED_RUNS} without start-up and files", file=sys.stderr)
     if show:
         show_window(levels)
 
@@ -373,7 +377,11 @@ def _conclude(results: dict[str, Any], out: Path, quiet: bool, required: list[st
         for picture in scene["comparisons"]:
             word = outcome(picture)
             pixels, error = picture["pixels"], (picture["metrics"] or {}).get("max_error", 0)
-            found = f"{pixels['unexplained']} of {pixels['total']} pixels differ, by at most {error:.3g} levels" if pixels else picture["reason"]
+            found = (
+                f"{pixels['unexplained']} of {pixels['total']} pixels differ, by at most {error:.3g} levels"
+                if pixels
+                else picture["reason"]
+            )
             print(f"{scene['scene']}  {picture['renderer']}  {word}: {found}")
             if word == "failed" or (word == "not-installed" and picture["renderer"] in required):
                 code = NOT_DONE
@@ -393,7 +401,12 @@ def _progress(quiet: bool, verbose: bool, total: int) -> Iterator[Callable[[str]
     from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn(), TextColumn("{task.description}"))
+    columns = (
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total}"),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=total)
         begun = False

@@ -1,12 +1,12 @@
 """The exception tree. Library code raises; only the command line turns errors into messages and exit codes.
 
-    CrossrayError
-    ├── InputError          what was asked for cannot be done as asked
-    │   └── SceneError      a scene file is wrong, at a place
-    └── FailureError        something that should have worked did not
-        ├── OutputError     a file could not be written
-        ├── DeviceError     Dr.Jit has no backend that works here
-        └── RendererError   another renderer crashed, ran out of time or left no usable picture
+CrossrayError
+├── InputError          what was asked for cannot be done as asked
+│   └── SceneError      a scene file is wrong, at a place
+└── FailureError        something that should have worked did not
+    ├── OutputError     a file could not be written
+    ├── DeviceError     Dr.Jit has no backend that works here
+    └── RendererError   another renderer crashed, ran out of time or left no usable picture
 """
 
 from __future__ import annotations

@@ -76,7 +76,9 @@ def _reads_back(path: Path) -> bool:
 def read_image(path: str | Path) -> Picture:
     """Read any picture as float64 levels; grey becomes three channels, alpha is dropped. Raises InputError."""
     if not Path(path).is_file():
-        raise InputError(f"{path}:1:1: expected a picture, found {'a directory' if Path(path).is_dir() else 'no such file'}")
+        raise InputError(
+            f"{path}:1:1: expected a picture, found {'a directory' if Path(path).is_dir() else 'no such file'}"
+        )
     source = oiio.ImageInput.open(str(path))
     if source is None:
         oiio.geterror()

@@ -97,7 +97,7 @@ def diffuse(surface: Vector, coefficient: Number, cosine: Number) -> Vector:
 
 
 def reflected_direction(d: Vector, normal: Vector) -> Vector:
-    """d - 2 (d.n) n at unit length."""
+    """The mirrored direction d - 2 (d.n) n, at unit length."""
     return dr.normalize(dr.fma(normal, -2 * dr.dot(d, normal), d))
 
 

@@ -103,7 +103,9 @@ class _Reader:
             if index == count:
                 self.refuse(f"nothing after {group}", _quote(token[0]), token.start(), done=0)
             if not re.fullmatch(NUMBER, token[0]) or not math.isfinite(float(token[0])):
-                wanted = "a finite number" if re.fullmatch(rf"{NUMBER}|(?i:[+-]?(nan|inf\w*))", token[0]) else "a number"
+                wanted = (
+                    "a finite number" if re.fullmatch(rf"{NUMBER}|(?i:[+-]?(nan|inf\w*))", token[0]) else "a number"
+                )
                 self.refuse(f"{wanted} in {group}", _quote(token[0]), token.start(), done=0)
         self.refuse(group, f"only {_plural(len(line.split()))}", len(line.rstrip()), done=0)
 

@@ -16,13 +16,15 @@ from numpy.typing import DTypeLike, NDArray
 from reference.device import Types, array_types
 from reference.errors import InputError
 from reference.model import DOCUMENT, Mask, Model, Number, Vector, Window
-from reference.scene import EYE, LIGHT, Scene
+from reference.scene import EYE, LIGHT, Plane, Scene, Sphere
 
 UNROLLED = 16  # surfaces; beyond this, compile time outweighs what straight code gains
 BAND = 1 << 22  # pixels a kernel launch, which bounds the memory of large pictures
 NOTHING = 0xFFFFFFFF  # the index of no surface
 LARGEST_SIDE = 1 << 16  # pixels
 LARGEST_DEPTH = 1 << 20  # bounces
+
+State = tuple[Number, ...]
 
 
 def render(
@@ -53,22 +55,25 @@ def render(
         band = picture[top : top + rows]
         direction = _camera_directions(world, width, height, top, len(band))
         colour = dr.ravel(_radiance(world, direction, limit)).numpy()
-        band[:] = np.broadcast_to(colour.reshape(-1, 3), (len(band) * width, 3)).reshape(band.shape)  # constant if empty
+        band[:] = np.broadcast_to(colour.reshape(-1, 3), (len(band) * width, 3)).reshape(
+            band.shape
+        )  # constant if empty
     return picture
 
 
 class World:
-    """A scene on the device: what the intersections and the shading read."""
+    """A scene on the device and the model that reads it."""
 
     def __init__(self, scene: Scene, model: Model, types: Types) -> None:
         scene = model.surfaces(scene)
         self.model = model
         self.Float, self.Index, self.Mask = types.Float, types.Index, types.Mask
         self.Vector, self.Packet = types.Vector3, types.Vector4
-        self.spheres, self.surfaces = len(scene.spheres), len(scene.spheres) + len(scene.planes)
-        geometry: list[tuple[float, ...]] = [(*s.centre, s.radius, 0, 0, 0, 0) for s in scene.spheres]
+        surfaces: list[Sphere | Plane] = [*scene.spheres, *scene.planes]
+        self.spheres, self.surfaces = len(scene.spheres), len(surfaces)
+        geometry: list[State] = [(*s.centre, s.radius, 0, 0, 0, 0) for s in scene.spheres]
         geometry += [(*p.point, 0, *p.unit_normal, 0) for p in scene.planes]
-        materials = [(*s.colour, s.diffuse, s.reflection, 0, 0, 0) for s in (*scene.spheres, *scene.planes)]
+        materials: list[State] = [(*s.colour, s.diffuse, s.reflection, 0, 0, 0) for s in surfaces]
         self.geometry, self.materials = self._table(geometry), self._table(materials)
         self.uniform = [[self._uniform(value) for value in row] for row in geometry[: UNROLLED + 1]]
         self.ambient = self.Vector(*map(self._uniform, scene.ambient))
@@ -80,25 +85,29 @@ class World:
         """A number that is an input of the kernel, not a part of its code."""
         return dr.opaque(self.Float, value)
 
-    def _table(self, rows: list[tuple[float, ...]]) -> Number:
+    def _table(self, rows: list[State]) -> Number:
         return self.Float(np.array(rows or [(0.0,) * 8]).ravel())  # an empty scene still has something to gather
 
-    def gather(self, table: Number, packet: Number, active: Mask = True) -> Number:
-        return dr.gather(self.Packet, table, packet, active)
+    def row(self, table: Number, index: Number, active: Mask = True) -> list[Number]:
+        """The eight numbers of a surface in `geometry` or `materials`, fetched in two packets."""
+        packets = (dr.gather(self.Packet, table, 2 * index + half, active) for half in (0, 1))
+        return [number for packet in packets for number in packet]
 
-    def fold(self, first: int, last: int, step: Callable[..., tuple[Number, ...]], state: tuple[Number, ...], going: Callable[..., Mask]) -> tuple[Number, ...]:
-        """Apply `state = step(index, row, *state)` to surfaces first..last-1, while a ray is still `going(*state)`."""
+    def fold(
+        self, first: int, last: int, step: Callable[..., State], state: State, going: Callable[..., Mask]
+    ) -> State:
+        """Apply `state = step(index, geometry, *state)` to surfaces first..last-1, while rays are `going(*state)`."""
         if self.surfaces <= UNROLLED:
             for index in range(first, last):
                 state = step(self.Index(index), self.uniform[index], *state)
             return state
 
-        def body(index: Number, *state: Number) -> tuple[Number, ...]:
-            head, tail = self.gather(self.geometry, 2 * index), self.gather(self.geometry, 2 * index + 1)
-            return (index + 1, *step(index, [*head, *tail], *state))
+        def body(index: Number, *state: Number) -> State:
+            return (index + 1, *step(index, self.row(self.geometry, index), *state))
 
         start, end = dr.opaque(self.Index, first), dr.opaque(self.Index, last)
-        return dr.while_loop((start, *state), lambda index, *state: (index < end) & going(*state), body)[1:]
+        _, *folded = dr.while_loop((start, *state), lambda index, *state: (index < end) & going(*state), body)
+        return tuple(folded)
 
 
 def _camera_directions(world: World, width: int, height: int, top: int, rows: int) -> Vector:
@@ -119,22 +128,22 @@ def _radiance(world: World, direction: Vector, limit: Number) -> Vector:
     origin = world.Vector(*EYE)
     t, hit = nearest(world, world.model.camera, origin, direction, world.Index(NOTHING), world.Mask(True))
     while hit != NOTHING:
+        x, y, z, radius, normal_x, normal_y, normal_z, _ = world.row(world.geometry, hit)
+        red, green, blue, diffuse, mirror, _, _, _ = world.row(world.materials, hit)
         point = dr.fma(direction, t, origin)
-        head, tail = world.gather(world.geometry, 2 * hit), world.gather(world.geometry, 2 * hit + 1)
-        material, mirror = world.gather(world.materials, 2 * hit), world.gather(world.materials, 2 * hit + 1)
-        place, surface = world.Vector(head.x, head.y, head.z), world.Vector(material.x, material.y, material.z)
-        normal = dr.select(
-            hit < world.first_plane, world.model.sphere_normal(point, place, head.w), world.Vector(tail.x, tail.y, tail.z)
-        )
+        sphere_normal = world.model.sphere_normal(point, world.Vector(x, y, z), radius)
+        normal = dr.select(hit < world.first_plane, sphere_normal, world.Vector(normal_x, normal_y, normal_z))
+
+        surface = world.Vector(red, green, blue)
         to_light = world.light - point
         cosine = world.model.cosine(normal, to_light)
         lit = (cosine != 0) & ~blocked(world, point, to_light, hit, cosine != 0)
         local = world.model.ambient(surface, world.ambient, world.ambient_coefficient)
-        local += dr.select(lit, world.model.diffuse(surface, material.w, cosine), 0)
+        local += dr.select(lit, world.model.diffuse(surface, diffuse, cosine), 0)
         colour = dr.fma(local, weight, colour)
 
         depth += 1
-        weight = world.model.reflected_weight(weight, mirror.x, depth)
+        weight = world.model.reflected_weight(weight, mirror, depth)
         origin = world.model.reflected_origin(point, normal)
         direction = world.model.reflected_direction(direction, normal)
         leaving = hit
@@ -145,47 +154,50 @@ def _radiance(world: World, direction: Vector, limit: Number) -> Vector:
     return colour
 
 
-def nearest(world: World, window: Window, origin: Vector, d: Vector, leaving: Number, active: Mask) -> tuple[Number, Number]:
-    """Distance and index of the first surface along each ray; on a tie the first listed."""
-    dd = dr.dot(d, d)
+def nearest(
+    world: World, window: Window, origin: Vector, d: Vector, leaving: Number, active: Mask
+) -> tuple[Number, Number]:
+    """Distance and index of the first surface along each ray; of a tie the first listed, NOTHING for a miss."""
+    model, dd = world.model, dr.dot(d, d)
 
-    def closer(index: Number, t: Number, counts: Mask, best: Number, hit: Number) -> tuple[Number, Number]:
+    def closer(index: Number, t: Number, counts: Mask, best: Number, hit: Number) -> State:
         counts &= t < best
         return dr.select(counts, t, best), dr.select(counts, index, hit)
 
-    def meet_sphere(index: Number, row: list[Number], best: Number, hit: Number) -> tuple[Number, Number]:
-        p, left = origin - world.Vector(*row[:3]), leaving == index
-        near, far = world.model.sphere_distances(p, d, dd, row[3], left)
+    def meet_sphere(index: Number, row: list[Number], best: Number, hit: Number) -> State:
+        left = leaving == index
+        near, far = model.sphere_distances(origin - world.Vector(*row[:3]), d, dd, row[3], left)
         t = dr.select(window.sphere(near, left), near, far)
         return closer(index, t, window.sphere(t, left), best, hit)
 
-    def meet_plane(index: Number, row: list[Number], best: Number, hit: Number) -> tuple[Number, Number]:
-        normal, left = world.Vector(*row[4:7]), leaving == index
+    def meet_plane(index: Number, row: list[Number], best: Number, hit: Number) -> State:
+        left, normal = leaving == index, world.Vector(*row[4:7])
         facing = dr.dot(d, normal)
-        t = world.model.plane_distance(world.Vector(*row[:3]) - origin, normal, facing, left)
+        t = model.plane_distance(world.Vector(*row[:3]) - origin, normal, facing, left)
         return closer(index, t, window.plane(t, facing, left), best, hit)
 
-    state = (world.Float(dr.inf), world.Index(NOTHING))
-    state = world.fold(0, world.spheres, meet_sphere, state, lambda *_: active)
-    return world.fold(world.spheres, world.surfaces, meet_plane, state, lambda *_: active)
+    miss = (world.Float(dr.inf), world.Index(NOTHING))
+    found = world.fold(0, world.spheres, meet_sphere, miss, lambda *_: active)
+    t, hit = world.fold(world.spheres, world.surfaces, meet_plane, found, lambda *_: active)
+    return t, hit
 
 
 def blocked(world: World, origin: Vector, d: Vector, leaving: Number, active: Mask) -> Mask:
-    """Whether any surface stands between each point and the light at t = 1."""
-    dd = dr.dot(d, d)
+    """Whether any surface stands between each point and the light, which is at t = 1 along `d`."""
+    model, window, dd = world.model, world.model.shadow, dr.dot(d, d)
 
-    def meet_sphere(index: Number, row: list[Number], dark: Mask) -> tuple[Mask]:
-        p, left = origin - world.Vector(*row[:3]), leaving == index
-        near, far = world.model.sphere_distances(p, d, dd, row[3], left)
-        return (dark | world.model.shadow.sphere(near, left) | world.model.shadow.sphere(far, left),)
+    def meet_sphere(index: Number, row: list[Number], dark: Mask) -> State:
+        left = leaving == index
+        near, far = model.sphere_distances(origin - world.Vector(*row[:3]), d, dd, row[3], left)
+        return (dark | window.sphere(near, left) | window.sphere(far, left),)
 
-    def meet_plane(index: Number, row: list[Number], dark: Mask) -> tuple[Mask]:
-        normal, left = world.Vector(*row[4:7]), leaving == index
+    def meet_plane(index: Number, row: list[Number], dark: Mask) -> State:
+        left, normal = leaving == index, world.Vector(*row[4:7])
         facing = dr.dot(d, normal)
-        t = world.model.plane_distance(world.Vector(*row[:3]) - origin, normal, facing, left)
-        return (dark | world.model.shadow.plane(t, facing, left),)
+        t = model.plane_distance(world.Vector(*row[:3]) - origin, normal, facing, left)
+        return (dark | window.plane(t, facing, left),)
 
-    dark = world.Mask(False)
-    (dark,) = world.fold(0, world.spheres, meet_sphere, (dark,), lambda dark: active & ~dark)
-    (dark,) = world.fold(world.spheres, world.surfaces, meet_plane, (dark,), lambda dark: active & ~dark)
+    lit = (world.Mask(False),)
+    found = world.fold(0, world.spheres, meet_sphere, lit, lambda dark: active & ~dark)
+    (dark,) = world.fold(world.spheres, world.surfaces, meet_plane, found, lambda dark: active & ~dark)
     return dark

@@ -22,7 +22,7 @@ SETTINGS = {
     "ssim_min": "The smallest value of the SSIM map, averaged over RGB: the worst 11 x 11 neighbourhood.",
     "psnr": "20 log10(255 / RMSE), in decibels; empty where the pictures are equal.",
     "rmse": "Root mean square error over all pixels and channels, in levels.",
-    "flip": "Mean LDR-FLIP at 67 pixels per degree, levels / 255 taken as sRGB. Localises well; its mean hides small bugs.",
+    "flip": "Mean LDR-FLIP at 67 pixels per degree, levels / 255 taken as sRGB. Its mean hides small bugs.",
     "max_error": "The largest error of any channel of any pixel, in levels.",
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,9 @@ def page(folder: Path, results: dict[str, Any]) -> str:
     return environment.get_template("report.html").render(
         results=results,
         scenes=scenes,
+        summary=_summary(results),
         outcome=outcome,
+        marks=_marks,
         embed=lambda name: _embed(folder, name),
         settings=SETTINGS,
         thresholds=[f"{level:g}" for level in THRESHOLDS],
@@ -42,6 +45,20 @@ def outcome(picture: dict[str, Any]) -> str:
     if picture["status"] != "rendered":
         return str(picture["status"])
     return str(picture.get("verdict") or "agree")
+
+
+def _summary(results: dict[str, Any]) -> str:
+    """One sentence on the whole run."""
+    compared = [picture for scene in results["scenes"] for picture in scene["comparisons"] if picture["pixels"]]
+    agreeing = sum(picture["verdict"] == "agree" for picture in compared)
+    differing, total = (sum(picture["pixels"][key] for picture in compared) for key in ("unexplained", "total"))
+    return f"{agreeing} of {len(compared)} comparisons agree; {differing} of {total} pixels differ."
+
+
+def _marks(scene: dict[str, Any]) -> str:
+    """The differing pixels of all comparisons of a scene, as JSON."""
+    places = {(pixel["column"], pixel["row"]) for picture in scene["comparisons"] for pixel in picture["worst"]}
+    return json.dumps([{"column": column, "row": row} for column, row in sorted(places, key=lambda place: place[::-1])])
 
 
 def _badness(picture: dict[str, Any]) -> tuple[int, int, float]:
@@ -60,8 +77,10 @@ def _asset(name: str) -> str:
 
 
 def _number(value: float | None) -> str:
-    """Six significant digits, or a dash for what is not defined."""
-    return "–" if value is None else f"{value:.6g}"
+    """Four significant digits (never rounded up to 1), or a dash for what is not defined."""
+    if value is None:
+        return "–"
+    return "0.9999…" if 0.99995 <= value < 1 else f"{value:.4g}"
 
 
 def _seconds(value: float | None) -> str:

@@ -8,7 +8,7 @@ import platform
 import re
 import shutil
 from collections.abc import Mapping
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ class Recording:
         self.data: dict[str, Any] = {
             "version": 1,
             "crossray": version,
-            "started": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+            "started": datetime.now(UTC).isoformat(timespec="seconds"),
             "environment": environment(),
             "scenes": [],
         }
@@ -103,7 +103,7 @@ def slug(name: str) -> str:
 
 def environment() -> dict[str, Any]:
     """What the run's numbers depend on: machine and versions."""
-    versions = {}
+    versions: dict[str, str | None] = {}
     for package in PACKAGES:
         try:
             versions[package] = metadata.version(package)

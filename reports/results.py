@@ -39,7 +39,15 @@ def _judge_scene(folder: Path, entry: dict[str, Any], progress: Callable[[str], 
 
 
 def _compare(folder: Path, truth: NDArray[Any] | None, picture: dict[str, Any]) -> dict[str, Any]:
-    result = {**picture, "verdict": None, "metrics": None, "pixels": None, "over": None, "worst": [], "difference": None}
+    result = {
+        **picture,
+        "verdict": None,
+        "metrics": None,
+        "pixels": None,
+        "over": None,
+        "worst": [],
+        "difference": None,
+    }
     if truth is None or picture["image"] is None:
         return result
     levels = read_image(folder / f"{picture['image']}.exr")

@@ -60,4 +60,5 @@ class Adapter(Protocol):
     TIMING: str
 
     @staticmethod
-    def export(scene: Scene, settings: Settings) -> Export: ...
+    def export(scene: Scene, settings: Settings) -> Export:
+        """The scene in the renderer's language."""

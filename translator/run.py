@@ -68,7 +68,15 @@ def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 6
     except RendererError as error:
         seconds = time.perf_counter() - start
         return Outcome(
-            name, renderer.TITLE, FAILED, version, str(error), seconds, command=command, log=error.log, notes=export.notes
+            name,
+            renderer.TITLE,
+            FAILED,
+            version,
+            str(error),
+            seconds,
+            command=command,
+            log=error.log,
+            notes=export.notes,
         )
     seconds = time.perf_counter() - start
     timing = re.search(renderer.TIMING, log)
@@ -126,7 +134,12 @@ def _resolve(command: tuple[str, ...]) -> list[str]:
 
 def _run(command: list[str], folder: Path, extra: dict[str, str], timeout: float) -> str:
     """Run in `folder` with nothing of the user's environment but the search path. Returns the end of the log."""
-    environment = {"PATH": os.environ.get("PATH", os.defpath), "LANG": "C.UTF-8", "HOME": str(folder), "TMPDIR": str(folder)}
+    environment = {
+        "PATH": os.environ.get("PATH", os.defpath),
+        "LANG": "C.UTF-8",
+        "HOME": str(folder),
+        "TMPDIR": str(folder),
+    }
     program = shutil.which(command[0])
     if program is None:
         raise RendererError(f"{command[0]} is not installed")

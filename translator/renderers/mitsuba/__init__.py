@@ -1,4 +1,4 @@
-"""Mitsuba 3: stock shapes, materials, light, sensor and film in XML; the integrator is ours (`whitted.py` beside it)."""
+"""Mitsuba 3: stock shapes, materials, light, sensor and film in XML; the integrator is ours (`whitted.py` here)."""
 
 from __future__ import annotations
 
@@ -117,7 +117,9 @@ def _refuse(scene: Scene, settings: Settings) -> None:
     reach |= {f"plane {i}": abs(_dot(p.unit_normal, p.point)) for i, p in enumerate(scene.planes, 1)}
     for name, distance in reach.items():
         if distance > FARTHEST:
-            raise Unsupported(f"Mitsuba's single precision is too coarse beyond {FARTHEST:g}: {name} reaches {distance:g}")
+            raise Unsupported(
+                f"Mitsuba's single precision is too coarse beyond {FARTHEST:g}: {name} reaches {distance:g}"
+            )
     for number, sphere in enumerate(scene.spheres, 1):
         if sphere.radius > LARGEST_RADIUS:
             raise Unsupported(
@@ -125,10 +127,14 @@ def _refuse(scene: Scene, settings: Settings) -> None:
                 f"sphere {number} has {sphere.radius:g}"
             )
     gaps = {f"sphere {i}": math.dist(s.centre, LIGHT) - s.radius for i, s in enumerate(scene.spheres, 1)}
-    gaps |= {f"plane {i}": _dot(p.unit_normal, LIGHT) - _dot(p.unit_normal, p.point) for i, p in enumerate(scene.planes, 1)}
+    gaps |= {
+        f"plane {i}": _dot(p.unit_normal, LIGHT) - _dot(p.unit_normal, p.point) for i, p in enumerate(scene.planes, 1)
+    }
     for name, gap in gaps.items():
         if abs(gap) < LIGHT_GAP:
-            raise Unsupported(f"Mitsuba's shadow rays end {LIGHT_GAP:g} short of the light: {name} passes within {abs(gap):g}")
+            raise Unsupported(
+                f"Mitsuba's shadow rays end {LIGHT_GAP:g} short of the light: {name} passes within {abs(gap):g}"
+            )
 
 
 def _surface(name: str, shape: str, geometry: str, surface: Sphere | Plane, light: list[float]) -> str:
@@ -156,7 +162,8 @@ def _frame(plane: Plane) -> str:
     across = _unit(_cross(axis, normal))
     along = _cross(normal, across)
     rows = [
-        [PLANE_RADIUS * u, PLANE_RADIUS * v, n, p] for u, v, n, p in zip(across, along, normal, plane.point, strict=True)
+        [PLANE_RADIUS * u, PLANE_RADIUS * v, n, p]
+        for u, v, n, p in zip(across, along, normal, plane.point, strict=True)
     ]
     matrix = "  ".join(_spaced(row) for row in [*rows, [0.0, 0.0, 0.0, 1.0]])
     return f'<transform name="to_world"><matrix value="{matrix}"/></transform>'
