@@ -7,6 +7,7 @@ values, one kernel for each pair of counts; beyond that it loops over the surfac
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 from typing import Any
 
 import drjit as dr
@@ -86,7 +87,9 @@ class World:
         return dr.opaque(self.Float, value)
 
     def _table(self, rows: list[State]) -> Number:
-        return self.Float(np.array(rows or [(0.0,) * 8]).ravel())  # an empty scene still has something to gather
+        """All rows in one array; one of zeros where there is none, so that there is something to gather."""
+        # Dr.Jit borrows NumPy arrays where they lie, and the kernel would depend on how they are aligned.
+        return self.Float(list(chain.from_iterable(rows or [(0.0,) * 8])))
 
     def row(self, table: Number, index: Number, active: Mask = True) -> list[Number]:
         """The eight numbers of a surface in `geometry` or `materials`, fetched in two packets."""

@@ -1,0 +1,82 @@
+"""Shared by the tests of translators, reports and the command line."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from reference import EXACT, Scene, render
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLE = ROOT / "scenes" / "example1.txt"
+
+# Coloured ambient; a sphere before the screen; kr > 1; a twin of the second sphere that is listed later and vanishes;
+# a wall lit from the side that the eye does not see, its normal 5000 long; a floor that the screen cuts.
+TRICKY = """\
+10 200 90
+0.3
+3
+255 0 0
+5 5 90
+8
+0.5
+0.25
+0 255 0
+0 0 300
+40
+1
+1.5
+0 0 255
+0 0 300
+40
+0.2
+0
+2
+200 100 50
+0 0 400
+0 3000 4000
+0.5
+0.75
+60 70 80
+0 -20 0
+0 1 0
+1
+0.1
+"""
+
+
+def need(program: str) -> str:
+    """The path of a program; without it the test is skipped, and in continuous integration it fails."""
+    path = shutil.which(program)
+    if path is None and os.environ.get("CI") == "true":
+        pytest.fail(f"{program} is not installed")
+    if path is None:
+        pytest.skip(f"{program} is not installed")
+    return path
+
+
+def exact(scene: Scene, width: int, height: int) -> NDArray[np.float64]:
+    return np.asarray(render(scene, EXACT, width=width, height=height, dtype=np.float64))
+
+
+def pixels_over(a: NDArray[np.floating], b: NDArray[np.floating], level: float = 0.5) -> int:
+    """How many pixels differ by more than `level` in any channel, both clamped."""
+    error = np.abs(np.clip(a, 0, 255).astype(float) - np.clip(b, 0, 255))
+    return int((~(error <= level)).any(axis=-1).sum())
+
+
+def crossray(*words: str | Path, stdin: str = "", cwd: Path | None = None, path: str | None = None) -> "Finished":
+    """Run the command line in its own process."""
+    environment = os.environ | ({} if path is None else {"PATH": path})
+    command = [sys.executable, "-m", "crossray", *map(str, words)]
+    return subprocess.run(
+        command, input=stdin, cwd=cwd, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+Finished = subprocess.CompletedProcess[str]

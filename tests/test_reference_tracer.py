@@ -1,0 +1,231 @@
+"""The tracer against an independent transcription of the assignment, and against itself."""
+
+import os
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import transcription
+
+import reference
+from reference.device import provide_llvm
+from reference.errors import DeviceError, InputError
+from reference.image import quantise, read_image
+from reference.scene import Plane, Scene, Sphere
+from reference.text import dump, parse
+
+provide_llvm()
+
+import drjit as dr
+
+from reference import device, tracer
+from reference.model import CONVENTIONS, DOCUMENT, EXACT, PUBLISHED
+from reference.tracer import render
+
+SCENES = Path(__file__).parent.parent / "scenes"
+EXAMPLES = sorted(SCENES.glob("example?.txt"))
+# A light exactly on a surface, ties of two surfaces and unmerged twins are decided by rounding, in both programs.
+KNIFE_EDGES = ("coincident", "corner_tie", "light_on_sphere")
+SEMANTIC = [path for path in sorted((SCENES / "semantic").glob("*.txt")) if path.stem not in KNIFE_EDGES]
+FLOOR = Plane((90, 120, 60), (0, -100, 0), (0, 3, 0), 0.6, 0.4)
+
+pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
+
+
+def names(path: Path) -> str:
+    return path.stem
+
+
+def random_scene(spheres: int, seed: int) -> Scene:
+    pick = random.Random(seed)
+    balls = [
+        Sphere(
+            (pick.randrange(256), pick.randrange(256), pick.randrange(256)),
+            (pick.uniform(-150, 150), pick.uniform(-90, 150), pick.uniform(120, 600)),
+            pick.uniform(3, 20),
+            pick.random(),
+            pick.random() * 0.6,
+        )
+        for _ in range(spheres)
+    ]
+    return Scene((255, 255, 255), 0.1, tuple(balls), (FLOOR,))
+
+
+def worst(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.abs(a - b).max())
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+@pytest.mark.parametrize("path", EXAMPLES + SEMANTIC, ids=names)
+def test_agrees_with_the_transcription(path: Path, convention: str) -> None:
+    expected = transcription.picture(path.read_text(), 250, 250, 3, convention)
+    drawn = render(Scene.load(path), CONVENTIONS[convention], width=250, height=250, dtype=float)
+    assert worst(drawn, expected) <= 1e-6
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=names)
+def test_published_pictures_are_equal_in_every_byte(path: Path) -> None:
+    expected = transcription.truncated(transcription.picture(path.read_text(), 400, 400, 3, "published"))
+    assert np.array_equal(quantise(render(Scene.load(path), PUBLISHED, width=400, height=400, dtype=float)), expected)
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=names)
+def test_published_differs_from_the_document_in_mirrors_only(path: Path) -> None:
+    scene = Scene.load(path)
+    document, published = (render(scene, model, width=250, height=250) for model in (DOCUMENT, PUBLISHED))
+    assert np.all(published <= document + 0.01)
+    assert np.count_nonzero(np.abs(published - document).max(-1) > 8) > 250
+    local = [render(scene, model, width=250, height=250, depth=0) for model in (DOCUMENT, PUBLISHED)]
+    assert worst(*local) < 1e-3
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=names)
+def test_single_precision_is_not_speckled(path: Path) -> None:
+    scene = Scene.load(path)
+    double, single = (np.clip(render(scene, EXACT, precision=name), 0, 255) for name in ("double", "single"))
+    assert np.count_nonzero(np.abs(double - single).max(-1) > 0.5) <= 10
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=names)
+def test_document_and_exact_agree_on_the_examples(path: Path) -> None:
+    scene = Scene.load(path)
+    assert worst(render(scene, DOCUMENT, dtype=float), render(scene, EXACT, dtype=float)) < 1e-8
+
+
+@pytest.mark.parametrize("path", EXAMPLES + SEMANTIC, ids=names)
+def test_the_loop_draws_what_straight_code_draws(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene.load(path)
+    monkeypatch.setattr(tracer, "UNROLLED", 1000)
+    straight = render(scene, width=120, height=120, dtype=float)
+    monkeypatch.setattr(tracer, "UNROLLED", 0)
+    assert worst(render(scene, width=120, height=120, dtype=float), straight) < 1e-9
+
+
+def test_many_spheres_agree_with_the_transcription() -> None:
+    scene = random_scene(150, seed=3)
+    expected = transcription.picture(dump(scene), 60, 60, 3, "document")
+    assert worst(render(scene, width=60, height=60, dtype=float), expected) <= 1e-6
+
+
+def kernels(*scenes: Scene) -> set[str]:
+    """The kernels that drew these scenes, by the hash of their code."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for scene in scenes:
+            render(scene, width=32, height=32)
+        return {entry["hash"] for entry in dr.kernel_history() if entry["type"] == dr.KernelType.JIT}
+
+
+def test_other_numbers_need_no_other_kernel() -> None:
+    first, second = (Scene.load(SCENES / f"example{number}.txt") for number in (1, 2))
+    assert kernels(first) == kernels(second)
+    assert kernels(random_scene(4, seed=1)) == kernels(*(random_scene(4, seed=seed) for seed in range(2, 6)))
+
+
+def test_large_scenes_share_one_kernel_whatever_their_counts() -> None:
+    planes = replace(random_scene(40, seed=3), planes=(FLOOR,) * 7)
+    alone = kernels(random_scene(tracer.UNROLLED, seed=1))
+    assert kernels(random_scene(tracer.UNROLLED, seed=1), random_scene(60, seed=2), planes) == alone
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("text", ["0\n0\n", "0\n1\n9 9 9\n0 -9 0\n0 1 0\n1\n1\n", "1\n9 9 9\n0 0 300\n9\n1\n1\n0\n"])
+def test_scenes_without_some_objects(text: str, precision: str) -> None:
+    scene = parse("255 255 255\n0.1\n" + text)
+    drawn = render(scene, width=20, height=30, precision=precision)
+    expected = transcription.picture(dump(scene), 20, 30, 3, "document")
+    assert drawn.shape == (30, 20, 3)
+    assert worst(drawn, expected) < 1e-3
+
+
+@pytest.mark.parametrize("size", [(1, 1), (7, 3), (3, 200), (640, 480)])
+def test_any_resolution(size: tuple[int, int]) -> None:
+    text = (SCENES / "example3.txt").read_text()
+    drawn = render(parse(text), width=size[0], height=size[1], dtype=float)
+    assert worst(drawn, transcription.picture(text, *size)) <= 1e-6
+
+
+@pytest.mark.parametrize("depth", [0, 1, 2, 12])
+def test_any_depth(depth: int) -> None:
+    text = (SCENES / "semantic" / "parallel_mirrors.txt").read_text()
+    drawn = render(parse(text), width=60, height=60, depth=depth, dtype=float)
+    assert worst(drawn, transcription.picture(text, 60, 60, depth)) <= 1e-6
+
+
+def test_endless_mirrors_end() -> None:
+    scene = Scene.load(SCENES / "semantic" / "parallel_mirrors.txt")
+    assert np.isfinite(render(scene, width=8, height=8, depth=1000)).all()
+
+
+def test_bands_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene.load(SCENES / "example1.txt")
+    whole = render(scene, width=101, height=77)
+    monkeypatch.setattr(tracer, "BAND", 1000)
+    assert np.array_equal(render(scene, width=101, height=77), whole)
+
+
+def test_render_returns_unclamped_float32() -> None:
+    scene = Scene((255, 255, 255), 3.0, (Sphere((250, 200, 0), (0, 0, 300), 90, 1, 0),))
+    drawn = reference.render(scene, width=10, height=10)
+    assert drawn.dtype == np.float32
+    assert drawn.max() > 500
+
+
+@pytest.mark.parametrize("options", [{"width": 0}, {"height": 1 << 20}, {"depth": -1}, {"precision": "half"}])
+def test_requests_out_of_range(options: dict[str, int]) -> None:
+    with pytest.raises(InputError, match="expected"):
+        render(Scene((0, 0, 0), 0), **options)  # type: ignore[arg-type]
+
+
+def test_a_mistake_is_the_model_with_a_step_replaced() -> None:
+    scene = Scene.load(SCENES / "example1.txt")
+    unlit = replace(DOCUMENT, cosine=lambda normal, to_light: dr.zeros(type(to_light.x), dr.width(to_light)))
+    assert (
+        worst(
+            render(scene, unlit, width=50, height=50, depth=0),
+            render(
+                replace(
+                    scene,
+                    spheres=tuple(replace(s, diffuse=0.0) for s in scene.spheres),
+                    planes=tuple(replace(p, diffuse=0.0) for p in scene.planes),
+                ),
+                width=50,
+                height=50,
+                depth=0,
+            ),
+        )
+        < 1e-3
+    )
+
+
+def test_the_documents_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[bool] = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("matplotlib.pyplot.show", lambda: shown.append(True))
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    scene = Scene.load(SCENES / "example1.txt")
+    scene.render()
+    assert not shown
+    scene.render(show=True)
+    assert shown
+    picture = read_image(tmp_path / "scene.jpg")
+    assert picture.shape == (1000, 1000, 3)
+    assert np.abs(picture - quantise(render(scene, dtype=float))).mean() < 2
+
+
+def test_an_llvm_that_aborts_the_process_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(device.LLVM_VARIABLE, "/usr/lib/libLLVM-of-the-system.so")
+    monkeypatch.setattr(device, "_TRIAL", "import os; os.abort()")
+    with pytest.raises(DeviceError, match="does not work with Dr"):
+        device.array_types(device="cpu")
+
+
+def test_the_llvm_of_the_installation_is_used_unless_the_user_chose(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(device.LLVM_VARIABLE)
+    device.provide_llvm()
+    assert os.environ[device.LLVM_VARIABLE] == str(device.find_llvm())
+    monkeypatch.setenv(device.LLVM_VARIABLE, "/chosen.so")
+    device.provide_llvm()
+    assert os.environ[device.LLVM_VARIABLE] == "/chosen.so"

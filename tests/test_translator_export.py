@@ -1,0 +1,240 @@
+"""The files that the adapters write, with no renderer run.
+
+The expected files are checked by hand against their scenes. After a change on purpose, write them anew with
+`CROSSRAY_REFRESH=1 python -m pytest tests/test_translator_export.py` and read the difference before keeping it.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from helpers import EXAMPLE, TRICKY
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reference import Plane, Scene, Sphere
+from reference.text import dump, parse
+from translator.contract import PYTHON, Settings, Unsupported
+from translator.registry import adapter, renderer_names
+
+EXPECTED = Path(__file__).parent / "expected"
+SCENES = {"example1": EXAMPLE.read_text(encoding="utf-8"), "tricky": TRICKY}
+WRITTEN = {"povray": ("scene.pov", ".pov"), "mitsuba": ("scene.xml", ".xml")}
+SETTINGS = Settings(64, 48, 3)
+NUMBER = re.compile(r"(?<![\w.])-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?(?![\w.])")
+pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
+PURE = """
+import json, os, sys
+from reference.text import parse
+from translator.contract import Settings
+from translator.registry import adapter, renderer_names
+
+touched = []
+
+def watch(event, arguments):
+    if event == "open":
+        name, mode, flags = arguments
+        if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+            touched.append(name)
+    elif event.partition(".")[0] in ("subprocess", "shutil", "tempfile", "socket") or event in (
+        "os.mkdir", "os.remove", "os.rename", "os.system", "os.exec", "os.fork", "os.posix_spawn"
+    ):
+        touched.append(event)
+
+scene = parse(sys.stdin.read())
+adapters = {name: adapter(name) for name in renderer_names()}
+sys.addaudithook(watch)
+exports = {name: vars(renderer.export(scene, Settings(64, 48, 3))) for name, renderer in adapters.items()}
+again = {name: vars(renderer.export(scene, Settings(64, 48, 3))) for name, renderer in adapters.items()}
+assert not touched, touched
+assert exports == again
+assert not {"mitsuba", "drjit"} & set(sys.modules)
+print(json.dumps(exports))
+"""
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("renderer", WRITTEN)
+def test_export_is_as_expected(renderer: str, scene: str) -> None:
+    name, ending = WRITTEN[renderer]
+    text = adapter(renderer).export(parse(SCENES[scene]), SETTINGS).files[name]
+    expected = EXPECTED / (scene + ending)
+    if os.environ.get("CROSSRAY_REFRESH") == "1":
+        expected.write_text(text, encoding="utf-8")
+    assert text == expected.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", renderer_names())
+def test_command_and_picture_belong_to_the_export(name: str) -> None:
+    exported = adapter(name).export(parse(TRICKY), SETTINGS)
+    assert exported.command[0] in (PYTHON, name)
+    assert all(Path(file).parts == (file,) and text.endswith("\n") for file, text in exported.files.items())
+    assert exported.image not in exported.files
+    assert any(exported.image in word for word in exported.command)
+
+
+def test_native_export_reads_back_as_the_same_scene() -> None:
+    scene = parse(TRICKY)
+    assert parse(adapter("native").export(scene, SETTINGS).files["scene.txt"]) == scene
+
+
+def test_mitsuba_export_brings_its_integrator() -> None:
+    program = adapter("mitsuba").export(parse(TRICKY), SETTINGS).files["whitted.py"]
+    compile(program, "whitted.py", "exec")
+    assert "class Whitted(mi.SamplingIntegrator)" in program
+
+
+def test_exports_are_pure_and_deterministic(tmp_path: Path) -> None:
+    outputs = []
+    for seed in ("0", "1"):
+        result = subprocess.run(
+            [sys.executable, "-B", "-c", PURE],
+            input=TRICKY,
+            env={"PATH": "/nonexistent", "PYTHONHASHSEED": seed, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert result.returncode == 0, result.stderr
+        outputs.append(result.stdout)
+    assert outputs[0] == outputs[1]
+    assert set(json.loads(outputs[0])) == set(renderer_names())
+    assert not list(tmp_path.iterdir())
+
+
+def scene_of(*surfaces: Sphere | Plane) -> Scene:
+    spheres = tuple(surface for surface in surfaces if isinstance(surface, Sphere))
+    planes = tuple(surface for surface in surfaces if isinstance(surface, Plane))
+    return Scene((255, 255, 255), 0.1, spheres, planes)
+
+
+def ball(x: float, y: float, z: float, radius: float) -> Sphere:
+    return Sphere((255, 0, 0), (x, y, z), radius, 1, 0)
+
+
+def wall(height: float, y: float = 1.0) -> Plane:
+    return Plane((255, 0, 0), (0, height, 0), (0, y, 0), 1, 0)
+
+
+NEAR, FLOOR = ball(0, 0, 300, 10), wall(-100)
+REFUSED = {
+    "povray depth": ("povray", scene_of(), 256, "POV-Ray follows at most 255 bounces, not 256"),
+    "povray sphere": (
+        "povray",
+        scene_of(NEAR, ball(0, 0, 1e8, 1)),
+        3,
+        "POV-Ray sees nothing beyond 1e+08: sphere 2 reaches farther",
+    ),
+    "povray plane": (
+        "povray",
+        scene_of(FLOOR, wall(-3.4e7, -2)),
+        3,
+        "POV-Ray sees nothing beyond 1e+08: plane 2 lies too far from the eye",
+    ),
+    "mitsuba depth": (
+        "mitsuba",
+        scene_of(),
+        17,
+        "Mitsuba's single precision is too coarse for 17 bounces (at most 16)",
+    ),
+    "mitsuba sphere too far": (
+        "mitsuba",
+        scene_of(NEAR, ball(0, -1e6, 0, 1)),
+        3,
+        "Mitsuba's single precision is too coarse beyond 1e+06: sphere 2 reaches 1e+06",
+    ),
+    "mitsuba plane too far": (
+        "mitsuba",
+        scene_of(FLOOR, wall(-2e6, -0.5)),
+        3,
+        "Mitsuba's single precision is too coarse beyond 1e+06: plane 2 reaches 2e+06",
+    ),
+    "mitsuba radius": (
+        "mitsuba",
+        scene_of(NEAR, ball(0, 0, 3000, 2001)),
+        3,
+        "Mitsuba's single precision is too coarse for a radius over 2000: sphere 2 has 2001",
+    ),
+    "mitsuba sphere at the light": (
+        "mitsuba",
+        scene_of(NEAR, ball(500, 500, 600, 100.25)),
+        3,
+        "Mitsuba's shadow rays end 0.5 short of the light: sphere 2 passes within 0.25",
+    ),
+    "mitsuba plane at the light": (
+        "mitsuba",
+        scene_of(FLOOR, wall(499.75, 7)),
+        3,
+        "Mitsuba's shadow rays end 0.5 short of the light: plane 2 passes within 0.25",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_carried_is_refused_with_the_reason(case: str) -> None:
+    renderer, scene, depth, reason = REFUSED[case]
+    with pytest.raises(Unsupported) as refusal:
+        adapter(renderer).export(scene, Settings(64, 48, depth))
+    assert str(refusal.value) == reason
+
+
+@pytest.mark.parametrize(
+    ("renderer", "scene", "depth"),
+    [
+        ("povray", scene_of(ball(0, 0, 9.9e7, 1), wall(-3.3e7)), 255),
+        ("mitsuba", scene_of(ball(0, 0, 3000, 2000), ball(500, 500, 600, 99), wall(-1e6), wall(499)), 16),
+    ],
+)
+def test_what_is_just_within_the_limits_is_carried(renderer: str, scene: Scene, depth: int) -> None:
+    adapter(renderer).export(scene, Settings(64, 48, depth))
+
+
+@pytest.mark.parametrize("renderer", WRITTEN)
+def test_refusal_counts_surfaces_as_the_file_does(renderer: str) -> None:
+    twin = ball(0, 0, 300, 10)
+    with pytest.raises(Unsupported, match="sphere 3 "):
+        adapter(renderer).export(scene_of(NEAR, twin, ball(0, 0, 1e9, 1)), SETTINGS)
+
+
+numbers = st.floats(-1e5, 1e5)
+triples = st.tuples(numbers, numbers, numbers)
+spheres = st.builds(Sphere, triples, triples, st.floats(1e-9, 1e3), numbers, numbers)
+planes = st.builds(Plane, triples, triples, triples.filter(any), numbers, numbers)
+scenes = st.builds(
+    Scene, triples, numbers, st.lists(spheres, max_size=3).map(tuple), st.lists(planes, max_size=3).map(tuple)
+)
+
+
+@pytest.mark.parametrize("renderer", WRITTEN)
+@given(scene=scenes)
+def test_only_numbers_of_a_scene_reach_the_file(renderer: str, scene: Scene) -> None:
+    name, ending = WRITTEN[renderer]
+    try:
+        text = adapter(renderer).export(scene, SETTINGS).files[name]
+    except Unsupported:
+        return
+    known = (EXPECTED / f"tricky{ending}").read_text(encoding="utf-8")
+    assert set(NUMBER.sub("#", text).splitlines()) <= set(NUMBER.sub("#", known).splitlines())
+    if renderer == "mitsuba":
+        shapes = ElementTree.fromstring(text).findall("shape")
+        assert len({shape.get("id") for shape in shapes}) == len(shapes)
+
+
+@given(scene=scenes)
+def test_native_export_holds_nothing_but_numbers(scene: Scene) -> None:
+    text = adapter("native").export(scene, SETTINGS).files["scene.txt"]
+    assert text == dump(scene)
+    assert re.fullmatch(r"[0-9eE+\-. \n]+", text)
+
+
+@pytest.mark.parametrize("renderer", WRITTEN)
+def test_numbers_that_overflow_are_refused(renderer: str) -> None:
+    huge = Scene((1e308, 0, 0), 1e10, (Sphere((1e308, 0, 0), (0, 0, 300), 40, 1e10, 1e308),))
+    with pytest.raises(Unsupported):
+        adapter(renderer).export(huge, SETTINGS)
