@@ -26,7 +26,7 @@ lint: $(READY)
 bench: $(READY) renderers  ## Time the tracer beside POV-Ray and print the ratios
 	$(BIN)/python tests/benchmarks/peers.py
 
-pictures: $(READY)  ## Draw the pictures of the README
+pictures: report browser  ## Draw the pictures of the README
 	$(BIN)/python docs/pictures.py
 
 lock: $(READY)  ## Pin the newest versions of all dependencies, with hashes

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import enum
 import os
+import re
 import sys
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.core import TyperCommand
 
 from reference.errors import CrossrayError, FailureError, InputError, SceneWarning
-from reference.scene import Scene
+from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
 
 if TYPE_CHECKING:
     from translator.contract import Settings
@@ -37,29 +35,6 @@ app = typer.Typer(
 )
 
 
-class Convention(enum.StrEnum):
-    """The three readings of the assignment."""
-
-    document = "document"
-    published = "published"
-    exact = "exact"
-
-
-class Precision(enum.StrEnum):
-    """What the tracer computes in."""
-
-    double = "double"
-    single = "single"
-
-
-class Device(enum.StrEnum):
-    """Where the tracer computes."""
-
-    auto = "auto"
-    cpu = "cpu"
-    gpu = "gpu"
-
-
 @dataclass(frozen=True)
 class Size:
     """Width and height in pixels, as in 1000x1000."""
@@ -70,10 +45,10 @@ class Size:
     @staticmethod
     def parse(text: object) -> Size:
         """From a word on the command line, or a default."""
-        width, _, height = str(text).lower().partition("x")
-        if not (width.isascii() and width.isdigit() and height.isascii() and height.isdigit()):
-            raise typer.BadParameter(f"expected a size like 1000x1000, found {text!r}")
-        return Size(int(width), int(height))
+        match = re.fullmatch(r"([0-9]{1,6})[xX]([0-9]{1,6})", str(text))
+        if not match or not all(1 <= int(side) <= LARGEST_SIDE for side in match.groups()):
+            raise typer.BadParameter(f"expected a size like 1000x1000, at most {LARGEST_SIDE} a side, found {text!r}")
+        return Size(int(match[1]), int(match[2]))
 
     def __str__(self) -> str:
         return f"{self.width}x{self.height}"
@@ -106,7 +81,7 @@ class NamesCommand(TyperCommand):
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or - for standard input.")]
 SizeOption = Annotated[Size, typer.Option("--size", parser=Size.parse, metavar="WxH", help="Pixels across and down.")]
-DepthOption = Annotated[int, typer.Option("--depth", help="Bounces after the primary hit.")]
+DepthOption = Annotated[int, typer.Option("--depth", min=0, max=LARGEST_DEPTH, help="Bounces after the primary hit.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but results and errors.")]
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="Say more about what is being done.")]
 TimeoutOption = Annotated[float, typer.Option("--timeout", min=1, help="Seconds that a renderer may take.")]
@@ -133,9 +108,11 @@ def render(
     output: Annotated[Path, typer.Option("--output", "-o", help="JPEG, PNG or EXR.")] = Path("scene.jpg"),
     size: SizeOption = SQUARE,
     depth: DepthOption = 3,
-    convention: Annotated[Convention, typer.Option(help="Which reading of the assignment.")] = Convention.document,
-    precision: Annotated[Precision, typer.Option(help="What to compute in.")] = Precision.double,
-    device: Annotated[Device, typer.Option(help="Where to compute.")] = Device.auto,
+    convention: Annotated[
+        Literal["document", "published", "exact"], typer.Option(help="Which reading of the assignment.")
+    ] = "document",
+    precision: Annotated[Literal["double", "single"], typer.Option(help="What to compute in.")] = "double",
+    device: Annotated[Literal["auto", "cpu", "gpu"], typer.Option(help="Where to compute.")] = "auto",
     show: Annotated[bool, typer.Option("--show", help="Show the picture in a window.")] = False,
     time: Annotated[bool, typer.Option("--time", help="Trace a few times more and print how long that takes.")] = False,
     quiet: QuietOption = False,
@@ -157,11 +134,11 @@ def render(
     from reference.model import CONVENTIONS
     from reference.tracer import render as trace
 
-    model = CONVENTIONS[convention.value]
-    options: dict[str, Any] = {"depth": depth, "precision": precision.value, "device": device.value}
+    model = CONVENTIONS[convention]
+    options: dict[str, Any] = {"depth": depth, "precision": precision, "device": device}
     levels = trace(loaded, model, width=size.width, height=size.height, dtype=float, **options)
     write_image(output, levels)
-    _say(f"{output}: {size}, {convention.value}, {precision.value} precision", quiet or not verbose)
+    _say(f"{output}: {size}, {convention}, {precision} precision", quiet or not verbose)
     if time:
         runs = []
         for _ in range(TIMED_RUNS):
@@ -217,7 +194,7 @@ def export(
 @app.command(cls=NamesCommand)
 def check(
     scenes: Annotated[
-        list[str] | None, typer.Argument(metavar="[SCENE ...]", help="Scene files; default: the four examples.")
+        list[str] | None, typer.Argument(metavar="SCENE", help="Scene files; default: the four examples.")
     ] = None,
     out: Annotated[Path, typer.Option("--out", help="The folder for the report and the pictures.")] = Path("out"),
     renderers: Annotated[
@@ -237,6 +214,7 @@ def check(
     """
     from reference.text import dump
     from reports.recording import Recording
+    from reports.terminal import progress_bar, summary_lines
     from reports.writing import write_reports
     from translator.registry import NATIVE, adapter, renderer_names
     from translator.run import run_renderer
@@ -247,7 +225,7 @@ def check(
     loaded = [(path, _load(path, quiet)) for path in scenes or _examples()]
     settings = _settings(size, depth)
     run = Recording(out, _version())
-    with _progress(quiet, verbose, len(loaded) * (2 * len(names) + 1)) as advance:
+    with progress_bar(quiet, verbose, len(loaded) * (2 * len(names) + 1)) as advance:
         for path, scene in loaded:
             entry = run.add_scene(path, size.width, size.height, depth=depth, convention="exact", text=dump(scene))
             for name in (NATIVE, *names):
@@ -256,7 +234,9 @@ def check(
                 facts = {key: value for key, value in vars(outcome).items() if key != "picture"}
                 run.add_picture(entry, facts, outcome.picture)
         results = write_reports(out, advance)
-    raise typer.Exit(_conclude(results, out, quiet, required=renderers or []))
+    print("\n".join(summary_lines(results)))
+    _say(f"{out / 'report.html'}", quiet)
+    raise typer.Exit(_exit_code(results, required=renderers or []))
 
 
 @app.command()
@@ -365,58 +345,16 @@ def _settings(size: Size, depth: int) -> Settings:
     return Settings(size.width, size.height, depth, threads=os.cpu_count() or 1)
 
 
-def _conclude(results: dict[str, Any], out: Path, quiet: bool, required: list[str]) -> int:
-    """Print a line for each comparison; the exit code of a check."""
-    from reports.page import outcome
-
-    code = DONE
-    for scene in results["scenes"]:
-        if scene["reference"]["status"] != "rendered":
-            print(f"{scene['scene']}  native  {scene['reference']['status']}: {scene['reference']['reason']}")
-            code = NOT_DONE
-        for picture in scene["comparisons"]:
-            word = outcome(picture)
-            pixels, error = picture["pixels"], (picture["metrics"] or {}).get("max_error", 0)
-            found = (
-                f"{pixels['unexplained']} of {pixels['total']} pixels differ, by at most {error:.3g} levels"
-                if pixels
-                else picture["reason"]
-            )
-            print(f"{scene['scene']}  {picture['renderer']}  {word}: {found}")
-            if word == "failed" or (word == "not-installed" and picture["renderer"] in required):
-                code = NOT_DONE
-            elif word == "disagree":
-                code = max(code, DISAGREES)
-    _say(f"{out / 'report.html'}", quiet)
-    return code
-
-
-@contextmanager
-def _progress(quiet: bool, verbose: bool, total: int) -> Iterator[Callable[[str], None]]:
-    """A bar on a terminal; elsewhere a line for each step, if asked for."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda text: _say(text, quiet or not verbose)
-        return
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (
-        BarColumn(),
-        TextColumn("{task.completed}/{task.total}"),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=total)
-        begun = False
-
-        def advance(text: str) -> None:
-            nonlocal begun
-            bar.update(task, description=escape(text), advance=int(begun))
-            begun = True
-
-        yield advance
+def _exit_code(results: dict[str, Any], required: list[str]) -> int:
+    """The exit code of a check; a renderer that was asked for by name is required."""
+    references = [scene["reference"] for scene in results["scenes"]]
+    pictures = [picture for scene in results["scenes"] for picture in scene["comparisons"]]
+    missing = [
+        picture for picture in pictures if picture["status"] == "not-installed" and picture["renderer"] in required
+    ]
+    if missing or any(picture["status"] == "failed" for picture in [*references, *pictures]):
+        return NOT_DONE
+    return DISAGREES if any(picture["verdict"] == "disagree" for picture in pictures) else DONE
 
 
 def _say(text: str, quiet: bool = False) -> None:

@@ -14,6 +14,8 @@ EYE: Triple = (0.0, 0.0, 0.0)
 SCREEN = 50.0  # half the width and height of the screen, centred on the z axis: x right, y up
 SCREEN_DISTANCE = 100.0  # from the eye along z, into the scene
 LIGHT: Triple = (500.0, 500.0, 500.0)  # white, without distance falloff
+LARGEST_SIDE = 1 << 16  # pixels
+LARGEST_DEPTH = 1 << 20  # bounces
 
 
 @dataclass(frozen=True, slots=True)

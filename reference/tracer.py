@@ -17,13 +17,11 @@ from numpy.typing import DTypeLike, NDArray
 from reference.device import Types, array_types
 from reference.errors import InputError
 from reference.model import DOCUMENT, Mask, Model, Number, Vector, Window
-from reference.scene import EYE, LIGHT, Plane, Scene, Sphere
+from reference.scene import EYE, LARGEST_DEPTH, LARGEST_SIDE, LIGHT, Plane, Scene, Sphere
 
 UNROLLED = 16  # surfaces; beyond this, compile time outweighs what straight code gains
 BAND = 1 << 22  # pixels a kernel launch, which bounds the memory of large pictures
 NOTHING = 0xFFFFFFFF  # the index of no surface
-LARGEST_SIDE = 1 << 16  # pixels
-LARGEST_DEPTH = 1 << 20  # bounces
 
 State = tuple[Number, ...]
 

@@ -52,7 +52,7 @@ def _summary(results: dict[str, Any]) -> str:
     compared = [picture for scene in results["scenes"] for picture in scene["comparisons"] if picture["pixels"]]
     agreeing = sum(picture["verdict"] == "agree" for picture in compared)
     differing, total = (sum(picture["pixels"][key] for picture in compared) for key in ("unexplained", "total"))
-    return f"{agreeing} of {len(compared)} comparisons agree; {differing} of {total} pixels differ."
+    return f"{agreeing} of {len(compared)} comparisons agree; {differing:,} of {total:,} pixels differ."
 
 
 def _marks(scene: dict[str, Any]) -> str:

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -58,10 +59,7 @@ def process_seconds(path: Path, scene: Scene, folder: Path) -> tuple[float, floa
     times: dict[str, list[float]] = {"ours": [], "theirs": []}
     for _ in range(RUNS + 1):
         for name, command in (("ours", ours), ("theirs", theirs)):
-            run = [command, folder]
-            times[name].append(
-                seconds(lambda run=run: subprocess.run(run[0], cwd=run[1], check=True, capture_output=True))
-            )
+            times[name].append(seconds(partial(subprocess.run, command, cwd=folder, check=True, capture_output=True)))
     return median(times["ours"][1:]), median(times["theirs"][1:])
 
 
@@ -72,7 +70,7 @@ def main() -> None:
     for path in sorted((ROOT / "scenes").glob("example?.txt")):
         scene = Scene.load(path)
         ours = {
-            precision: median([seconds(lambda p=precision: render(scene, precision=p)) for _ in range(RUNS + 2)][2:])
+            precision: median([seconds(partial(render, scene, precision=precision)) for _ in range(RUNS + 2)][2:])
             for precision in ("double", "single")
         }
         theirs = [median(trace_seconds(name, scene) for _ in range(RUNS)) for name in peers]
