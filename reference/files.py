@@ -20,12 +20,13 @@ def replacing(path: str | Path) -> Iterator[Path]:
     Raises OutputError where the file cannot be written; what stood at `path` is then still there.
     """
     target = Path(os.path.realpath(path))
-    if target.exists() and not target.is_file():
-        raise OutputError(f"{path}: expected a file to write, found {'a directory' if target.is_dir() else 'a device'}")
-    if target.exists() and not os.access(target, os.W_OK):
-        raise OutputError(f"{path}: cannot be written: permission denied")
     temporary = None
     try:
+        if target.exists() and not target.is_file():
+            found = "a directory" if target.is_dir() else "a device"
+            raise OutputError(f"{path}: expected a file to write, found {found}")
+        if target.exists() and not os.access(target, os.W_OK):
+            raise OutputError(f"{path}: cannot be written: permission denied")
         handle, name = tempfile.mkstemp(prefix=".crossray-", suffix=target.suffix, dir=target.parent)
         os.close(handle)
         temporary = Path(name)
@@ -47,12 +48,6 @@ def write_text(path: str | Path, text: str) -> None:
     """Write a UTF-8 text file whole or not at all. Raises OutputError."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="")
-
-
-def write_bytes(path: str | Path, data: bytes) -> None:
-    """Write a file whole or not at all. Raises OutputError."""
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)
 
 
 def make_folder(path: str | Path) -> Path:

@@ -5,19 +5,20 @@ In memory a picture is height x width x 3 in levels (0..255), linear, row 0 on t
 
 from __future__ import annotations
 
+import errno
+import io
 import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from reference.errors import InputError, OutputError
+from reference.errors import InputError
 from reference.files import replacing
 
-FORMATS = (".jpg", ".jpeg", ".png", ".exr")
-JPEG = {"Compression": "jpeg:75", "jpeg:subsampling": "4:2:0"}  # what the document's pictures are saved with
+JPEG = (".jpg", ".jpeg")
+FORMATS = (*JPEG, ".png", ".exr")
 
 Picture = NDArray[np.floating[Any]]
 
@@ -44,26 +45,37 @@ def write_image(path: str | Path, levels: Picture) -> None:
     else:
         pixels = quantise(levels)
     with replacing(path) as temporary:
-        write_pixels(temporary, pixels)
+        if Path(path).suffix.lower() in JPEG:
+            temporary.write_bytes(_encode_jpeg(pixels))
+        else:
+            _write_pixels(temporary, pixels)
 
 
-def write_pixels(path: Path, pixels: NDArray[Any]) -> None:
+def _encode_jpeg(pixels: NDArray[np.uint8]) -> bytes:
+    """As the document's pictures are saved. In memory: OpenImageIO's JPEG writer ends the process on a full disk."""
+    from PIL import Image
+
+    data = io.BytesIO()
+    Image.fromarray(pixels).save(data, "JPEG", quality=75, subsampling="4:2:0")
+    return data.getvalue()
+
+
+def _write_pixels(path: Path, pixels: NDArray[Any]) -> None:
     """Write an array as it is (8 bit or float32) and read it back, since encoders can miss a full disk."""
+    import OpenImageIO as oiio
+
     height, width, channels = pixels.shape
     kind = oiio.FLOAT if pixels.dtype == np.float32 else oiio.UINT8
-    spec = oiio.ImageSpec(width, height, channels, kind)
-    for name, value in (JPEG if path.suffix.lower() in (".jpg", ".jpeg") else {}).items():
-        spec.attribute(name, value)
-    output = oiio.ImageOutput.create(str(path))
-    done = output is not None and output.open(str(path), spec) and output.write_image(pixels)
-    done = output is not None and output.close() and done
-    if not done or not _reads_back(path):
-        free = os.statvfs(path.parent).f_bavail
-        reason = "no space left on device" if not free else (output.geterror() if output else oiio.geterror())
-        raise OutputError(f"{path.name}: cannot be written: {reason.strip() or 'the file came out incomplete'}")
+    output: Any = oiio.ImageOutput.create(str(path))
+    done = output.open(str(path), oiio.ImageSpec(width, height, channels, kind)) and output.write_image(pixels)
+    if not (output.close() and done and _reads_back(path)):
+        reason = output.geterror() if os.statvfs(path.parent).f_bavail else os.strerror(errno.ENOSPC)
+        raise OSError(reason.replace(str(path), "").strip() or "the file came out incomplete")
 
 
 def _reads_back(path: Path) -> bool:
+    import OpenImageIO as oiio
+
     source = oiio.ImageInput.open(str(path))
     if source is None:
         oiio.geterror()
@@ -75,6 +87,8 @@ def _reads_back(path: Path) -> bool:
 
 def read_image(path: str | Path) -> Picture:
     """Read any picture as float64 levels; grey becomes three channels, alpha is dropped. Raises InputError."""
+    import OpenImageIO as oiio
+
     if not Path(path).is_file():
         raise InputError(
             f"{path}:1:1: expected a picture, found {'a directory' if Path(path).is_dir() else 'no such file'}"

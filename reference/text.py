@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import math
 import re
 import sys
@@ -12,7 +13,7 @@ from typing import NoReturn
 from reference.errors import SceneError, SceneWarning
 from reference.scene import Plane, Scene, Sphere, Triple
 
-NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 GROUPS = {1: re.compile(rf"\s*({NUMBER})\s*"), 3: re.compile(rf"\s*({NUMBER})\s+({NUMBER})\s+({NUMBER})\s*")}
 LINE_END = re.compile(r"\r\n|\n|\r")
 LARGEST_FILE = 1 << 30  # bytes
@@ -24,7 +25,10 @@ def load(path: str | Path) -> Scene:
     name = str(path)
     try:
         if name == "-":
-            name, data = "<stdin>", sys.stdin.buffer.read(LARGEST_FILE + 1)
+            name = "<stdin>"
+            if sys.stdin is None:
+                raise SceneError(name, 1, 1, "a readable scene file", "standard input closed")
+            data = sys.stdin.buffer.read(LARGEST_FILE + 1)
         else:
             if Path(path).is_dir():
                 raise SceneError(name, 1, 1, "a scene file", "a directory")
@@ -66,10 +70,11 @@ def _spell(value: float) -> str:
 
 
 def _decode(data: bytes, path: str) -> str:
+    data = data.removeprefix(codecs.BOM_UTF8)
     try:
-        return data.decode("utf-8-sig")
+        return data.decode()
     except UnicodeDecodeError as error:
-        before = data[: error.start].decode("utf-8-sig")
+        before = data[: error.start].decode()
         lines = LINE_END.split(before)
         found = f"the byte 0x{data[error.start]:02x}"
         raise SceneError(path, len(lines), len(lines[-1]) + 1, "text in UTF-8", found) from error
@@ -81,7 +86,7 @@ class _Reader:
     def __init__(self, text: str, path: str) -> None:
         self.path = path
         self.lines = [(number, line) for number, line in enumerate(LINE_END.split(text), 1) if line.strip()]
-        self.last = text.count("\n") + 1 if not self.lines else self.lines[-1][0]
+        self.last = len(LINE_END.split(text)) if not self.lines else self.lines[-1][0]
         self.position = 0
 
     def numbers(self, count: int, what: str) -> tuple[float, ...]:
@@ -150,7 +155,7 @@ class _Reader:
             self.refuse(f"a whole number of {what}, 0 or more", _spell(count))
         room = (left + SURFACE_LINES - 1) // SURFACE_LINES  # a surface cut short is refused where the file ends
         if count > room:
-            self.refuse(f"at most {room} {what} in the {_plural(left, 'line')} that follow", _spell(count))
+            self.refuse(f"{what}: at most {room}, as many as the rest of the file can hold", _spell(count))
         return int(count)
 
     def sphere(self, name: str) -> Sphere:
