@@ -35,6 +35,7 @@ lock: $(READY)  ## Pin the newest versions of all dependencies, with hashes
 		--output-file requirements.txt pyproject.toml
 
 $(READY): requirements.txt pyproject.toml
+	@ldconfig -p | grep -q 'libatomic\.so\.1' || $(call debian,libatomic1,ldconfig -p | grep 'libatomic\.so\.1',required)
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || $(call debian,python3-venv python3-pip,python3 -c "import ensurepip",required)
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --require-hashes --only-binary :all: -r requirements.txt

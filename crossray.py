@@ -31,7 +31,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Draw the ray tracing assignment's scenes, here and in other renderers, and compare the pictures.",
+    help="""Draw the ray tracing assignment's scenes, here and in other renderers, and compare the pictures.
+
+    \b
+    crossray render scenes/example1.txt
+    crossray check homework.txt --out out/homework
+    """,
 )
 
 
@@ -55,28 +60,29 @@ class Size:
 
 
 class NamesCommand(TyperCommand):
-    """Lets `--with` and `--to` take several renderers at once: the names that follow them, apart or with commas."""
+    """Lets `--with` and `--to` take several renderers at once: the names that follow them."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Repeat the option before each of the names."""
+        """Repeat the option before each further name."""
         from translator.registry import renderer_names
 
-        known, spread = set(renderer_names()), []
+        known = set(renderer_names())
+        spread: list[str] = []
         option = None
-        for position, word in enumerate(args):
-            if word == "--":
-                spread += args[position:]
-                break
-            if option and (word in known or args[position - 1] == option):
-                for name in word.split(","):
-                    spread += [option, name]
-                continue
-            option = word if word in ("--with", "--to") else None
-            if not option:
-                spread.append(word)
-        if args and args[-1] in ("--with", "--to"):
-            spread.append(args[-1])
+        for word in args:
+            if option and spread[-1] != option and known.issuperset(word.split(",")):
+                spread.append(option)
+            elif word in ("--with", "--to"):
+                option = word
+            elif not (option and spread[-1] == option):
+                option = None
+            spread.append(word)
         return super().parse_args(ctx, spread)
+
+
+def _split(names: list[str] | None) -> list[str]:
+    """Names that may come joined by commas, each once."""
+    return list(dict.fromkeys(name for joined in names or () for name in joined.split(",")))
 
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or - for standard input.")]
@@ -128,11 +134,8 @@ def render(
 
     check_format(output)
     loaded = _load(scene, quiet)
-    from reference.device import provide_llvm
-
-    provide_llvm()
-    from reference.model import CONVENTIONS
-    from reference.tracer import render as trace
+    from reference import CONVENTIONS
+    from reference import render as trace
 
     model = CONVENTIONS[convention]
     options: dict[str, Any] = {"depth": depth, "precision": precision, "device": device}
@@ -170,11 +173,11 @@ def export(
     import shlex
 
     from translator.contract import Unsupported
-    from translator.registry import NATIVE, adapter, renderer_names
+    from translator.registry import adapter, renderer_names
     from translator.run import command_line, write_export
 
     loaded, settings = _load(scene, quiet), _settings(size, depth)
-    adapters = {name: adapter(name) for name in to or [name for name in renderer_names() if name != NATIVE]}
+    adapters = {name: adapter(name) for name in _split(to) or renderer_names()[1:]}
     refused = 0
     for name, renderer in adapters.items():
         try:
@@ -219,7 +222,8 @@ def check(
     from translator.registry import NATIVE, adapter, renderer_names
     from translator.run import run_renderer
 
-    names = [name for name in dict.fromkeys(renderers or renderer_names()) if name != NATIVE]
+    required = _split(renderers)
+    names = [name for name in required or renderer_names() if name != NATIVE]
     for name in names:
         adapter(name)
     loaded = [(path, _load(path, quiet)) for path in scenes or _examples()]
@@ -236,7 +240,7 @@ def check(
         results = write_reports(out, advance)
     print("\n".join(summary_lines(results)))
     _say(f"{out / 'report.html'}", quiet)
-    raise typer.Exit(_exit_code(results, required=renderers or []))
+    raise typer.Exit(_exit_code(results, required))
 
 
 @app.command()

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from reference.device import provide_llvm
 from reference.errors import CrossrayError, SceneError, SceneWarning
 from reference.scene import Plane, Scene, Sphere
 
 if TYPE_CHECKING:
-    from reference.model import DOCUMENT, EXACT, PUBLISHED, Model
+    from reference.model import CONVENTIONS, DOCUMENT, EXACT, PUBLISHED, Model
     from reference.tracer import render
 
 __all__ = [
+    "CONVENTIONS",
     "DOCUMENT",
     "EXACT",
     "PUBLISHED",
@@ -25,16 +27,18 @@ __all__ = [
     "render",
 ]
 
-_LAZY = {"render": "tracer", "Model": "model", "DOCUMENT": "model", "EXACT": "model", "PUBLISHED": "model"}
+provide_llvm()  # Dr.Jit looks for its LLVM when it is imported
+
+_LAZY = dict.fromkeys(("CONVENTIONS", "DOCUMENT", "EXACT", "PUBLISHED", "Model"), "model") | {"render": "tracer"}
 
 
 def __getattr__(name: str) -> Any:
-    """Import the tracer, and with it Dr.Jit and the right LLVM, only when it is asked for."""
+    """Import the tracer, and with it Dr.Jit, only when it is asked for."""
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    from reference.device import provide_llvm
+    from reference.device import load_drjit
 
-    provide_llvm()
+    load_drjit()
     return getattr(import_module(f"reference.{_LAZY[name]}"), name)

@@ -46,9 +46,7 @@ def array_types(precision: str = "double", device: str = "auto") -> Types:
     """
     if precision not in PRECISIONS or device not in DEVICES:
         raise InputError(f"expected precision {PRECISIONS} on device {DEVICES}, found {precision!r} on {device!r}")
-    provide_llvm()
-    import drjit
-
+    drjit = load_drjit()
     if device == "auto":
         device = "gpu" if drjit.has_backend(drjit.JitBackend.CUDA) else "cpu"
     backend = drjit.JitBackend.CUDA if device == "gpu" else drjit.JitBackend.LLVM
@@ -63,9 +61,19 @@ def array_types(precision: str = "double", device: str = "auto") -> Types:
 
 
 def provide_llvm() -> None:
-    """Point Dr.Jit at the LLVM that came with crossray, unless the user chose one. Call before importing drjit."""
-    if not os.environ.get(LLVM_VARIABLE) and (library := find_llvm()):
+    """Point Dr.Jit at the LLVM that came with crossray, unless the user chose one or Dr.Jit has already looked."""
+    if not os.environ.get(LLVM_VARIABLE) and "drjit" not in sys.modules and (library := find_llvm()):
         os.environ[LLVM_VARIABLE] = str(library)
+
+
+def load_drjit() -> Any:
+    """Import Dr.Jit. Raises DeviceError where it cannot be loaded."""
+    try:
+        return importlib.import_module("drjit")
+    except (ImportError, NameError) as error:  # its own handler of the first raises the second
+        reason = str(error.__context__ or error)
+        advice = "; to have it: apt-get install libatomic1" if "libatomic" in reason else ""
+        raise DeviceError(f"Dr.Jit cannot be loaded: {reason}{advice}") from error
 
 
 def find_llvm() -> Path | None:
@@ -90,6 +98,8 @@ def _check_llvm() -> None:
     if trial.returncode:
         if chosen and (library := find_llvm()):
             raise DeviceError(f"{LLVM_VARIABLE}={chosen} does not work with Dr.Jit; unset it to use {library}")
+        if find_llvm():
+            raise DeviceError("the system's LLVM does not work with Dr.Jit; import `reference` before drjit or mitsuba")
         raise DeviceError(_missing("cpu"))
     _tried.add(chosen)
 
@@ -105,8 +115,10 @@ def _missing(device: str) -> str:
 
 def describe() -> list[tuple[str, bool, str]]:
     """For each part of the native tracer: its name, whether it works, and what is there or what to do."""
-    import drjit
-
+    try:
+        drjit = load_drjit()
+    except DeviceError as error:
+        return [("Dr.Jit", False, str(error))]
     rows = [("Dr.Jit", True, drjit.__version__)]
     try:
         array_types(device="cpu")

@@ -87,16 +87,26 @@ def merge_coincident(scene: Scene) -> Scene:
     """
     return replace(
         scene,
-        spheres=_first_of_each(scene.spheres, [(sphere.centre, sphere.radius) for sphere in scene.spheres]),
-        planes=_first_of_each(scene.planes, [_plane_identity(plane) for plane in scene.planes]),
+        spheres=tuple(distinct_spheres(scene).values()),
+        planes=tuple(distinct_planes(scene).values()),
     )
 
 
-def _first_of_each(surfaces: tuple[Surface, ...], identities: list[tuple[object, ...]]) -> tuple[Surface, ...]:
-    first: dict[tuple[object, ...], Surface] = {}
-    for identity, surface in zip(identities, surfaces, strict=True):
-        first.setdefault(identity, surface)
-    return tuple(first.values())
+def distinct_spheres(scene: Scene) -> dict[int, Sphere]:
+    """The spheres that `merge_coincident` keeps, by their number in the file, from 1."""
+    return _first_of_each(scene.spheres, [(sphere.centre, sphere.radius) for sphere in scene.spheres])
+
+
+def distinct_planes(scene: Scene) -> dict[int, Plane]:
+    """The planes that `merge_coincident` keeps, by their number in the file, from 1."""
+    return _first_of_each(scene.planes, [_plane_identity(plane) for plane in scene.planes])
+
+
+def _first_of_each(surfaces: tuple[Surface, ...], identities: list[tuple[object, ...]]) -> dict[int, Surface]:
+    first: dict[tuple[object, ...], int] = {}
+    for number, identity in enumerate(identities, 1):
+        first.setdefault(identity, number)
+    return {number: surfaces[number - 1] for number in first.values()}
 
 
 def _plane_identity(plane: Plane) -> tuple[Fraction, ...]:

@@ -46,6 +46,8 @@ def _finding(picture: dict[str, Any]) -> tuple[str | None, str]:
         return "error", picture["reason"]
     if picture["status"] in ("unsupported", "not-installed"):
         return "skipped", picture["reason"]
+    if "verdict" in picture and picture["verdict"] is None:
+        return "skipped", "not compared: the reference is missing"
     if picture.get("verdict") == "disagree":
         pixels = picture["pixels"]
         return "failure", f"{pixels['unexplained']} of {pixels['total']} pixels differ and are not explained"

@@ -65,7 +65,9 @@ def measure(reference: Picture, picture: Picture) -> Measurement:
     """Compare `picture` with `reference`, both height x width x 3 in levels. Raises ValueError for unequal shapes."""
     if reference.shape != picture.shape:
         raise ValueError(f"pictures of unequal shape: {reference.shape} and {picture.shape}")
-    a, b = (np.nan_to_num(np.clip(levels, 0, 255).astype(np.float64)) / 255 for levels in (reference, picture))
+    a, b = (np.clip(levels, 0, 255).astype(np.float64) / 255 for levels in (reference, picture))
+    unknown = np.isnan(a) | np.isnan(b)
+    a, b = np.where(unknown, 0, a), np.where(unknown, 1, b)  # what is not a number is as wrong as can be
     error = error_map(reference, picture)
     rmse = float(np.sqrt(np.mean(np.square(a - b)))) * 255
     ssim, ssim_min, ssim_min_at = _ssim(a, b)

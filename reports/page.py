@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from reports.metrics import SETTINGS, THRESHOLDS, TOLERANCE
 from reports.results import AMPLIFIED
 
-ORDER = {"failed": 0, "disagree": 1, "not-installed": 2, "unsupported": 3, "agree": 4}  # worst first
+WORST_FIRST = ("failed", "disagree", "not-compared", "not-installed", "unsupported", "agree")
 
 
 def page(folder: Path, results: dict[str, Any]) -> str:
@@ -44,7 +44,9 @@ def outcome(picture: dict[str, Any]) -> str:
     """One word for one picture: its verdict, or why it has none; `agree` for a reference that was drawn."""
     if picture["status"] != "rendered":
         return str(picture["status"])
-    return str(picture.get("verdict") or "agree")
+    if "verdict" not in picture:
+        return "agree"
+    return str(picture["verdict"] or "not-compared")
 
 
 def _summary(results: dict[str, Any]) -> str:
@@ -65,7 +67,7 @@ def _badness(picture: dict[str, Any]) -> tuple[int, int, float]:
     """Sorts worst first; of equal verdicts the more pixels, then the larger error."""
     unexplained = (picture.get("pixels") or {}).get("unexplained", 0)
     largest = (picture.get("metrics") or {}).get("max_error", 0)
-    return ORDER[outcome(picture)], -unexplained, -largest
+    return WORST_FIRST.index(outcome(picture)), -unexplained, -largest
 
 
 def _embed(folder: Path, name: str) -> str:

@@ -6,7 +6,6 @@ import json
 import os
 import platform
 import re
-import shutil
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib import metadata
@@ -32,7 +31,6 @@ class Recording:
 
     def __init__(self, folder: Path, version: str) -> None:
         self.folder = make_folder(folder)
-        shutil.rmtree(self.folder / IMAGES, ignore_errors=True)
         self.data: dict[str, Any] = {
             "version": 1,
             "crossray": version,
@@ -44,6 +42,7 @@ class Recording:
 
     def add_scene(self, path: str, width: int, height: int, **facts: Any) -> dict[str, Any]:
         """Begin a scene; returns its entry, whose `scene` is a name that no other scene of the run has."""
+        path = path.encode("utf-8", "replace").decode()  # a file name can be any bytes
         name = self._unique(Path(path).stem if path != "-" else "stdin")
         entry = {"scene": name, "path": path, "width": width, "height": height, **facts, "pictures": []}
         self.data["scenes"].append(entry)
@@ -80,7 +79,7 @@ class Recording:
 
     def _unique(self, name: str) -> str:
         taken = {slug(entry["scene"]) for entry in self.data["scenes"]}
-        names = [name, *(f"{name}-{number}" for number in range(2, len(taken) + 3))]
+        names = [name, *(f"{name[:60]}-{number}" for number in range(2, len(taken) + 3))]
         return next(candidate for candidate in names if slug(candidate) not in taken)
 
     def _save(self) -> None:

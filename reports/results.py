@@ -54,7 +54,8 @@ def _compare(folder: Path, truth: NDArray[Any] | None, picture: dict[str, Any]) 
     measured = measure(truth, levels)
     error = error_map(truth, levels)
     difference = f"{picture['image']}-difference"
-    write_image(folder / f"{difference}.png", np.abs(np.clip(truth, 0, 255) - np.clip(levels, 0, 255)) * AMPLIFIED)
+    shown = np.nan_to_num(np.abs(np.clip(truth, 0, 255) - np.clip(levels, 0, 255)), nan=255)
+    write_image(folder / f"{difference}.png", shown * AMPLIFIED)
     pixels = _account(measured)
     return {
         **result,

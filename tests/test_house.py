@@ -57,6 +57,7 @@ def test_the_walk_sees_imports(tmp_path: Path) -> None:
 
 def test_public_names() -> None:
     assert sorted(reference.__all__) == [
+        "CONVENTIONS",
         "CrossrayError",
         "DOCUMENT",
         "EXACT",

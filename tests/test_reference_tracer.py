@@ -2,26 +2,23 @@
 
 import os
 import random
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
+import drjit as dr
 import numpy as np
 import pytest
 import transcription
 
 import reference
-from reference.device import provide_llvm
+from reference import device, tracer
 from reference.errors import DeviceError, InputError
 from reference.image import quantise, read_image
+from reference.model import CONVENTIONS, DOCUMENT, EXACT, PUBLISHED
 from reference.scene import Plane, Scene, Sphere
 from reference.text import dump, parse
-
-provide_llvm()
-
-import drjit as dr
-
-from reference import device, tracer
-from reference.model import CONVENTIONS, DOCUMENT, EXACT, PUBLISHED
 from reference.tracer import render
 
 SCENES = Path(__file__).parent.parent / "scenes"
@@ -224,8 +221,23 @@ def test_an_llvm_that_aborts_the_process_is_found_out(monkeypatch: pytest.Monkey
 
 def test_the_llvm_of_the_installation_is_used_unless_the_user_chose(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(device.LLVM_VARIABLE)
+    monkeypatch.delitem(sys.modules, "drjit")
     device.provide_llvm()
     assert os.environ[device.LLVM_VARIABLE] == str(device.find_llvm())
     monkeypatch.setenv(device.LLVM_VARIABLE, "/chosen.so")
     device.provide_llvm()
     assert os.environ[device.LLVM_VARIABLE] == "/chosen.so"
+
+
+def test_drjit_imported_first_does_not_abort_the_process() -> None:
+    """A system's LLVM may work or not; the tracer draws, or says what to do."""
+    program = (
+        "import drjit, reference\n"
+        "try: print(reference.render(reference.Scene((0, 0, 0), 0), width=4, height=4).sum())\n"
+        "except reference.CrossrayError as error: print(error)\n"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != device.LLVM_VARIABLE}
+    result = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+    )
+    assert result.stdout.strip() == "0.0" or "LLVM" in result.stdout

@@ -12,6 +12,7 @@ A renderer is one module in `translator/renderers`; its name there (`_` read as 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -49,6 +50,13 @@ class Export:
 
 class Unsupported(CrossrayError):
     """The renderer cannot carry this scene; reads as a sentence for the user."""
+
+
+def number(value: float) -> str:
+    """A number as any language of scenes reads it. Raises Unsupported for a product that overflowed."""
+    if not math.isfinite(value):
+        raise Unsupported("the scene's numbers are so large that their products overflow")
+    return repr(float(value))
 
 
 class Adapter(Protocol):

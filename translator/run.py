@@ -8,6 +8,7 @@ import resource
 import shlex
 import shutil
 import signal
+import site
 import subprocess
 import sys
 import tempfile
@@ -16,7 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from translator.registry import adapter
 RENDERED, UNSUPPORTED, NOT_INSTALLED, FAILED = "rendered", "unsupported", "not-installed", "failed"
 KEPT_LOG = 64 * 1024  # bytes, from the end
 LARGEST_FILE = 8 << 30  # bytes that a renderer may write into one file
+KEPT_VARIABLES = ("DRJIT_LIBLLVM_PATH",)  # which LLVM the user chose
 LONGEST_VERSION = 60.0  # seconds a program may take to tell its version
 
 
@@ -122,7 +124,7 @@ def installed_version(name: str) -> str | None:
         try:
             answer = _run(_resolve(command), Path(folder), {}, LONGEST_VERSION)
         except RendererError:
-            return None
+            return "unknown" if command[0] != PYTHON and shutil.which(command[0]) else None
     match = re.search(pattern, answer)
     return match[1] if match else "unknown"
 
@@ -133,18 +135,19 @@ def _resolve(command: tuple[str, ...]) -> list[str]:
 
 
 def _run(command: list[str], folder: Path, extra: dict[str, str], timeout: float) -> str:
-    """Run in `folder` with nothing of the user's environment but the search path. Returns the end of the log."""
+    """Run in `folder` with nothing of the user's environment but where programs are. Returns the end of the log."""
     environment = {
         "PATH": os.environ.get("PATH", os.defpath),
+        "PYTHONUSERBASE": site.getuserbase(),
         "LANG": "C.UTF-8",
         "HOME": str(folder),
         "TMPDIR": str(folder),
     }
+    environment |= {name: os.environ[name] for name in KEPT_VARIABLES if name in os.environ}
     program = shutil.which(command[0])
     if program is None:
         raise RendererError(f"{command[0]} is not installed")
-    log_path = folder / ".crossray.log"
-    with open(log_path, "wb") as log:
+    with tempfile.TemporaryFile() as log:
         try:
             process = subprocess.Popen(
                 [program, *command[1:]],
@@ -163,15 +166,22 @@ def _run(command: list[str], folder: Path, extra: dict[str, str], timeout: float
                 resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
             code = process.wait(timeout)
         except subprocess.TimeoutExpired:
-            raise RendererError(f"it ran out of time ({timeout:g} s)", _tail(log_path)) from None
+            raise RendererError(f"it ran out of time ({timeout:g} s)", _tail(log)) from None
         finally:
             _kill_group(process)
-    text = _tail(log_path)
-    if code < 0:
-        raise RendererError(f"it was stopped by {signal.Signals(-code).name}", text)
-    if code > 0:
-        raise RendererError(f"it failed with exit code {code}", text)
-    return text
+        text = _tail(log)
+        if code < 0:
+            raise RendererError(f"it was stopped by {_signal_name(-code)}", text)
+        if code > 0:
+            raise RendererError(f"it failed with exit code {code}", text)
+        return text
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _kill_group(process: subprocess.Popen[bytes]) -> None:
@@ -181,8 +191,8 @@ def _kill_group(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _tail(path: Path) -> str:
-    with open(path, "rb") as file:
-        file.seek(max(0, file.seek(0, os.SEEK_END) - KEPT_LOG))
-        text = file.read().decode("utf-8", "replace").replace("\r\n", "\n")
-    return re.sub(r"[^\n]*\r", "", text)  # progress that was drawn over
+def _tail(file: IO[bytes]) -> str:
+    """The end of a log, without the progress that was drawn over."""
+    file.seek(max(0, file.seek(0, os.SEEK_END) - KEPT_LOG))
+    text = file.read().decode("utf-8", "replace").replace("\r\n", "\n")
+    return "\n".join(line.rpartition("\r")[2] for line in text.split("\n"))

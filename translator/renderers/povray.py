@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
-from reference.scene import LIGHT, SCREEN, SCREEN_DISTANCE, Plane, Scene, Sphere, Triple, merge_coincident
-from translator.contract import Export, Settings, Unsupported
+from reference.scene import (
+    LIGHT,
+    SCREEN,
+    SCREEN_DISTANCE,
+    Plane,
+    Scene,
+    Sphere,
+    Triple,
+    distinct_planes,
+    distinct_spheres,
+)
+from translator.contract import Export, Settings, Unsupported, number
 
 TITLE = "POV-Ray"
 INSTALL = "apt-get install povray"
@@ -41,8 +51,8 @@ light_source {{ {light}*Unit, rgb 1 }}
 
 def export(scene: Scene, settings: Settings) -> Export:
     """One `.pov` file. Each surface: ambient and diffuse from its colour, the given normal on both sides, a mirror."""
-    scene = merge_coincident(scene)
-    _refuse(scene, settings)
+    spheres, planes = distinct_spheres(scene), distinct_planes(scene)
+    _refuse(spheres, planes, settings)
     size = (f"+W{settings.width}", f"+H{settings.height}")
     exactly = ("-A", "-D", "-P", "+FN16", "File_Gamma=1.0", f"+WT{settings.threads}")
     command = ("povray", "+Iscene.pov", "+Oscene.png", *size, *exactly)
@@ -58,34 +68,34 @@ def export(scene: Scene, settings: Settings) -> Export:
         light=_vector(LIGHT),
     )
     parts = [header]
-    parts += [_sphere(number, sphere) for number, sphere in enumerate(scene.spheres, 1)]
-    parts += [_plane(number, plane) for number, plane in enumerate(scene.planes, 1)]
+    parts += [_sphere(f"sphere {place}", sphere) for place, sphere in spheres.items()]
+    parts += [_plane(f"plane {place}", plane) for place, plane in planes.items()]
     notes = ("The picture is a 16 bit PNG with linear values; viewers that honour its gamma show it brighter.",)
     return Export({"scene.pov": "\n".join(parts)}, command, "scene.png", notes)
 
 
-def _refuse(scene: Scene, settings: Settings) -> None:
+def _refuse(spheres: dict[int, Sphere], planes: dict[int, Plane], settings: Settings) -> None:
     if settings.depth > DEEPEST:
         raise Unsupported(f"POV-Ray follows at most {DEEPEST} bounces, not {settings.depth}")
-    for number, sphere in enumerate(scene.spheres, 1):
+    for place, sphere in spheres.items():
         if max(map(abs, sphere.centre)) + sphere.radius > FARTHEST:
-            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: sphere {number} reaches farther")
-    for number, plane in enumerate(scene.planes, 1):
+            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: sphere {place} reaches farther")
+    for place, plane in planes.items():
         if abs(_offset(plane)) > FARTHEST / 3:  # slanting rays go farther
-            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: plane {number} lies too far from the eye")
+            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: plane {place} lies too far from the eye")
 
 
-def _sphere(number: int, sphere: Sphere) -> str:
-    shape = f"sphere {{ {_vector(sphere.centre)}*Unit, {sphere.radius!r}*Unit"
-    return _object(f"sphere {number}", shape, sphere, near=sphere.centre[2] - sphere.radius <= SCREEN_DISTANCE)
+def _sphere(name: str, sphere: Sphere) -> str:
+    shape = f"sphere {{ {_vector(sphere.centre)}*Unit, {number(sphere.radius)}*Unit"
+    return _object(name, shape, sphere, near=sphere.centre[2] - sphere.radius <= SCREEN_DISTANCE)
 
 
-def _plane(number: int, plane: Plane) -> str:
+def _plane(name: str, plane: Plane) -> str:
     normal, offset = plane.unit_normal, _offset(plane)
     middle = SCREEN_DISTANCE * normal[2]  # n.d over the screen is middle -+ spread; the plane is met at offset / n.d
     spread = SCREEN * (abs(normal[0]) + abs(normal[1]))
     near = middle + spread >= offset if offset > 0 else middle - spread <= offset
-    return _object(f"plane {number}", f"plane {{ {_vector(normal)}, {offset!r}*Unit", plane, near)
+    return _object(name, f"plane {{ {_vector(normal)}, {number(offset)}*Unit", plane, near)
 
 
 def _object(name: str, shape: str, surface: Sphere | Plane, near: bool) -> str:
@@ -103,12 +113,12 @@ def _object(name: str, shape: str, surface: Sphere | Plane, near: bool) -> str:
 def _texture(surface: Sphere | Plane) -> str:
     """The pair `diffuse front, back` swapped for the inside: the given normal shades both sides."""
     pigment = f"pigment {{ rgb {_vector(surface.colour)}/255 }}"
-    outside, inside = _finish(repr(surface.diffuse), surface), _finish(f"0, {surface.diffuse!r}", surface)
+    outside, inside = _finish(number(surface.diffuse), surface), _finish(f"0, {number(surface.diffuse)}", surface)
     return f"  texture {{ {pigment} {outside} }}\n  interior_texture {{ {pigment} {inside} }}\n"
 
 
 def _finish(diffuse: str, surface: Sphere | Plane) -> str:
-    return f"finish {{ ambient 1 diffuse {diffuse} specular 0 phong 0 reflection {{ {surface.reflection!r} }} }}"
+    return f"finish {{ ambient 1 diffuse {diffuse} specular 0 phong 0 reflection {{ {number(surface.reflection)} }} }}"
 
 
 def _offset(plane: Plane) -> float:
@@ -116,4 +126,4 @@ def _offset(plane: Plane) -> float:
 
 
 def _vector(values: Triple | tuple[float, ...]) -> str:
-    return f"<{', '.join(map(repr, values))}>"
+    return f"<{', '.join(map(number, values))}>"

@@ -6,8 +6,18 @@ import math
 from importlib import resources
 from typing import Any
 
-from reference.scene import LIGHT, SCREEN, SCREEN_DISTANCE, Plane, Scene, Sphere, Triple, merge_coincident
-from translator.contract import PYTHON, Export, Settings, Unsupported
+from reference.scene import (
+    LIGHT,
+    SCREEN,
+    SCREEN_DISTANCE,
+    Plane,
+    Scene,
+    Sphere,
+    Triple,
+    distinct_planes,
+    distinct_spheres,
+)
+from translator.contract import PYTHON, Export, Settings, Unsupported, number
 
 TITLE = "Mitsuba 3"
 INSTALL = "pip install mitsuba"
@@ -78,8 +88,9 @@ SURFACE = """
 
 def export(scene: Scene, settings: Settings) -> Export:
     """A scene file in XML and the Python program with the integrator, which draws it."""
-    scene = merge_coincident(scene)
-    _refuse(scene, settings)
+    spheres = {f"sphere {place}": sphere for place, sphere in distinct_spheres(scene).items()}
+    planes = {f"plane {place}": plane for place, plane in distinct_planes(scene).items()}
+    _refuse(spheres, planes, settings)
     command = (PYTHON, "whitted.py", "scene.xml", "scene.exr")
     header = HEADER.format(
         command=" ".join(command),
@@ -93,15 +104,10 @@ def export(scene: Scene, settings: Settings) -> Export:
         intensity=_spaced([math.pi] * 3),
     )
     light = [value * scene.ambient_coefficient / 256 for value in scene.ambient]
-    spheres = [
-        _surface(f"sphere-{number}", "sphere", _ball(sphere), sphere, light)
-        for number, sphere in enumerate(scene.spheres, 1)
-    ]
-    planes = [
-        _surface(f"plane-{number}", "disk", _frame(plane), plane, light) for number, plane in enumerate(scene.planes, 1)
-    ]
+    shapes = [_surface(name, "sphere", _ball(sphere), sphere, light) for name, sphere in spheres.items()]
+    shapes += [_surface(name, "disk", _frame(plane), plane, light) for name, plane in planes.items()]
     program = resources.files(__name__).joinpath("whitted.py").read_text(encoding="utf-8")
-    files = {"scene.xml": "".join([header, *spheres, *planes, "</scene>\n"]), "whitted.py": program}
+    files = {"scene.xml": "".join([header, *shapes, "</scene>\n"]), "whitted.py": program}
     notes = (
         "Diffuse and mirror are one blended BSDF: a share of 2^-23 for diffuse, whose reflectance is scaled by 2^23.",
         "Ambient light is emission. Planes are disks of radius 1e9.",
@@ -109,39 +115,33 @@ def export(scene: Scene, settings: Settings) -> Export:
     return Export(files, (*command, "--time"), "scene.exr", notes)
 
 
-def _refuse(scene: Scene, settings: Settings) -> None:
+def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:
     """Single precision bounds how deep, how far and how near the light a scene may go."""
+    coarse = "Mitsuba's single precision is too coarse"
     if settings.depth > DEEPEST:
-        raise Unsupported(f"Mitsuba's single precision is too coarse for {settings.depth} bounces (at most {DEEPEST})")
-    reach = {f"sphere {i}": max(map(abs, s.centre)) + s.radius for i, s in enumerate(scene.spheres, 1)}
-    reach |= {f"plane {i}": abs(_dot(p.unit_normal, p.point)) for i, p in enumerate(scene.planes, 1)}
+        raise Unsupported(f"{coarse} for {settings.depth} bounces (at most {DEEPEST})")
+    offsets = {name: _dot(plane.unit_normal, plane.point) for name, plane in planes.items()}
+    reach = {name: max(map(abs, sphere.centre)) + sphere.radius for name, sphere in spheres.items()}
+    reach |= {name: abs(offset) for name, offset in offsets.items()}
     for name, distance in reach.items():
-        if distance > FARTHEST:
-            raise Unsupported(
-                f"Mitsuba's single precision is too coarse beyond {FARTHEST:g}: {name} reaches {distance:g}"
-            )
-    for number, sphere in enumerate(scene.spheres, 1):
+        if not distance <= FARTHEST:
+            raise Unsupported(f"{coarse} beyond {FARTHEST:g}: {name} reaches {distance:g}")
+    for name, sphere in spheres.items():
         if sphere.radius > LARGEST_RADIUS:
-            raise Unsupported(
-                f"Mitsuba's single precision is too coarse for a radius over {LARGEST_RADIUS}: "
-                f"sphere {number} has {sphere.radius:g}"
-            )
-    gaps = {f"sphere {i}": math.dist(s.centre, LIGHT) - s.radius for i, s in enumerate(scene.spheres, 1)}
-    gaps |= {
-        f"plane {i}": _dot(p.unit_normal, LIGHT) - _dot(p.unit_normal, p.point) for i, p in enumerate(scene.planes, 1)
-    }
+            raise Unsupported(f"{coarse} for a radius over {LARGEST_RADIUS}: {name} has {sphere.radius:g}")
+    gaps = {name: math.dist(sphere.centre, LIGHT) - sphere.radius for name, sphere in spheres.items()}
+    gaps |= {name: _dot(plane.unit_normal, LIGHT) - offsets[name] for name, plane in planes.items()}
     for name, gap in gaps.items():
         if abs(gap) < LIGHT_GAP:
-            raise Unsupported(
-                f"Mitsuba's shadow rays end {LIGHT_GAP:g} short of the light: {name} passes within {abs(gap):g}"
-            )
+            short = f"Mitsuba's shadow rays end {LIGHT_GAP:g} short of the light"
+            raise Unsupported(f"{short}: {name} passes within {abs(gap):g}")
 
 
 def _surface(name: str, shape: str, geometry: str, surface: Sphere | Plane, light: list[float]) -> str:
     colour = [value / 255 for value in surface.colour]
     return SURFACE.format(
         shape=shape,
-        name=name,
+        name=name.replace(" ", "-"),
         geometry=geometry,
         share=MIRROR_SHARE,
         diffuse=_constant("reflectance", [surface.diffuse * value / (1 - MIRROR_SHARE) for value in colour]),
@@ -152,7 +152,7 @@ def _surface(name: str, shape: str, geometry: str, surface: Sphere | Plane, ligh
 
 def _ball(sphere: Sphere) -> str:
     centre = f'<point name="center" value="{_spaced(sphere.centre)}"/>'
-    return f'{centre}\n    <float name="radius" value="{sphere.radius!r}"/>'
+    return f'{centre}\n    <float name="radius" value="{number(sphere.radius)}"/>'
 
 
 def _frame(plane: Plane) -> str:
@@ -183,7 +183,7 @@ def _unit(a: Triple) -> Triple:
 
 
 def _spaced(values: Any) -> str:
-    return " ".join(map(repr, values))
+    return " ".join(map(number, values))
 
 
 def _dot(a: Triple, b: Triple) -> float:

@@ -1,0 +1,5 @@
+"""Imported before any test module: `reference` tells Dr.Jit which LLVM to use, which must come before `import drjit`."""
+
+import reference
+
+assert reference
