@@ -1,4 +1,4 @@
-"""Imported before any test module: `reference` tells Dr.Jit which LLVM to use, which must come before `import drjit`."""
+"""Imported before any test: `reference` tells Dr.Jit which LLVM to use, which must come before `import drjit`."""
 
 import reference
 
