@@ -4,6 +4,8 @@ VENV := .venv
 PYTHON ?= python3
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+HAS_VENV := $(PYTHON) -c 'import ensurepip; import venv'
+HAS_ATOMIC := $(PYTHON) -c 'import ctypes; ctypes.CDLL("libatomic.so.1")'
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
@@ -35,8 +37,8 @@ lock: $(READY)  ## Pin the newest versions of all dependencies, with hashes
 		--output-file requirements.txt pyproject.toml
 
 $(READY): requirements.txt pyproject.toml
-	@ldconfig -p | grep -q 'libatomic\.so\.1' || $(call debian,libatomic1,ldconfig -p | grep 'libatomic\.so\.1',required)
-	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || $(call debian,python3-venv python3-pip,python3 -c "import ensurepip",required)
+	@$(HAS_ATOMIC) 2>/dev/null || $(call debian,libatomic1,$(HAS_ATOMIC),required)
+	@$(HAS_VENV) 2>/dev/null || $(call debian,python3-venv python3-pip,$(HAS_VENV),required)
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --require-hashes --only-binary :all: -r requirements.txt
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .

@@ -7,6 +7,8 @@ import re
 import sys
 import warnings
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -134,21 +136,21 @@ def render(
 
     check_format(output)
     loaded = _load(scene, quiet)
-    from reference import CONVENTIONS
-    from reference import render as trace
+    import reference
 
-    model = CONVENTIONS[convention]
-    options: dict[str, Any] = {"depth": depth, "precision": precision, "device": device}
-    levels = trace(loaded, model, width=size.width, height=size.height, dtype=float, **options)
+    model = reference.CONVENTIONS[convention]
+    arithmetic = {"precision": precision, "device": device}
+    trace = partial(reference.render, loaded, model, width=size.width, height=size.height, depth=depth, **arithmetic)
+    levels = trace(dtype=float)
     write_image(output, levels)
     _say(f"{output}: {size}, {convention}, {precision} precision", quiet or not verbose)
     if time:
-        runs = []
+        runs = [perf_counter()]
         for _ in range(TIMED_RUNS):
-            start = perf_counter()
-            trace(loaded, model, width=size.width, height=size.height, dtype=float, **options)
-            runs.append(perf_counter() - start)
-        print(f"traced in {median(runs):.4f} s, the median of {TIMED_RUNS} without start-up and files", file=sys.stderr)
+            trace(dtype=float)
+            runs.append(perf_counter())
+        seconds = median(after - before for before, after in pairwise(runs))
+        print(f"traced in {seconds:.4f} s, the median of {TIMED_RUNS} without start-up and files", file=sys.stderr)
     if show:
         show_window(levels)
 
