@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import os
 import re
 import sys
@@ -40,6 +41,14 @@ app = typer.Typer(
     crossray check homework.txt --out out/homework
     """,
 )
+
+
+class Convention(enum.StrEnum):
+    """The readings of the assignment."""
+
+    document = "document"
+    published = "published"
+    exact = "exact"
 
 
 @dataclass(frozen=True)
@@ -116,9 +125,7 @@ def render(
     output: Annotated[Path, typer.Option("--output", "-o", help="JPEG, PNG or EXR.")] = Path("scene.jpg"),
     size: SizeOption = SQUARE,
     depth: DepthOption = 3,
-    convention: Annotated[
-        Literal["document", "published", "exact"], typer.Option(help="Which reading of the assignment.")
-    ] = "document",
+    convention: Annotated[Convention, typer.Option(help="Which reading of the assignment.")] = Convention.document,
     precision: Annotated[Literal["double", "single"], typer.Option(help="What to compute in.")] = "double",
     device: Annotated[Literal["auto", "cpu", "gpu"], typer.Option(help="Where to compute.")] = "auto",
     show: Annotated[bool, typer.Option("--show", help="Show the picture in a window.")] = False,
@@ -277,6 +284,45 @@ def compare(
         write_reports(out)
         _say(f"{out / 'report.html'}", quiet)
     raise typer.Exit(DISAGREES if measured.over["0.5"] else DONE)
+
+
+@app.command()
+def explain(
+    scene: SceneArgument,
+    column: Annotated[int, typer.Argument(help="From the left, from 0.")],
+    row: Annotated[int, typer.Argument(help="From the top, from 0.")],
+    size: SizeOption = SQUARE,
+    depth: DepthOption = 3,
+    convention: Annotated[
+        list[Convention] | None, typer.Option(help="Which reading; give two to see where they part.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The same for programs.")] = False,
+    quiet: QuietOption = False,
+    verbose: VerboseOption = False,
+) -> None:
+    """Tell the rays behind one pixel, every term with its numbers.
+
+    \b
+    crossray explain scenes/example1.txt 500 700
+    crossray explain scenes/example1.txt 500 700 --convention document --convention published
+    """
+    import dataclasses
+    import json
+
+    from reference.explanation import explain
+    from reference.model import CONVENTIONS
+    from reports.raytree import parting, ray_tree
+
+    loaded = _load(scene, quiet)
+    pixel = {"column": column, "row": row, "width": size.width, "height": size.height, "depth": depth}
+    told = [explain(loaded, CONVENTIONS[name], **pixel) for name in convention or [Convention.document]]
+    if as_json:
+        conventions = [dataclasses.asdict(explanation) for explanation in told]
+        print(json.dumps({"version": 1, "scene": scene, "conventions": conventions}, indent=1, allow_nan=False))
+        return
+    print("\n\n".join("\n".join(ray_tree(explanation)) for explanation in told))
+    for other in told[1:]:
+        print(f"\n{parting(told[0], other)}")
 
 
 @app.command()

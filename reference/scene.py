@@ -20,14 +20,14 @@ LARGEST_DEPTH = 1 << 20  # bounces
 
 @dataclass(frozen=True, slots=True)
 class Sphere:
-    """A sphere. Colour in levels (0..255), coefficients usually 0..1, `line` is its first line in the file."""
+    """A sphere. Colour in levels (0..255), coefficients usually 0..1, `lines` are its first and last in the file."""
 
     colour: Triple
     centre: Triple
     radius: float
     diffuse: float
     reflection: float
-    line: int = field(default=0, compare=False)
+    lines: tuple[int, int] = field(default=(0, 0), compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Plane:
     normal: Triple
     diffuse: float
     reflection: float
-    line: int = field(default=0, compare=False)
+    lines: tuple[int, int] = field(default=(0, 0), compare=False)
 
     @property
     def unit_normal(self) -> Triple:

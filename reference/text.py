@@ -160,21 +160,21 @@ class _Reader:
 
     def sphere(self, name: str) -> Sphere:
         colour = self.colour(f"{name}: colour")
-        line = self.lines[self.position - 1][0]
+        first = self.lines[self.position - 1][0]
         centre = self.triple(f"{name}: position")
         radius = self.scalar(f"{name}: radius")
         if radius <= 0:
             self.refuse(f"{name}: a radius above 0", _spell(radius))
-        return Sphere(colour, centre, radius, *self._coefficients(name), line)
+        return Sphere(colour, centre, radius, *self._coefficients(name), (first, self.lines[self.position - 1][0]))
 
     def plane(self, name: str) -> Plane:
         colour = self.colour(f"{name}: colour")
-        line = self.lines[self.position - 1][0]
+        first = self.lines[self.position - 1][0]
         point = self.triple(f"{name}: point")
         normal = self.triple(f"{name}: normal")
         if not any(normal):
             self.refuse(f"{name}: a normal that is not zero", "0 0 0")
-        return Plane(colour, point, normal, *self._coefficients(name), line)
+        return Plane(colour, point, normal, *self._coefficients(name), (first, self.lines[self.position - 1][0]))
 
     def _coefficients(self, name: str) -> tuple[float, float]:
         return (

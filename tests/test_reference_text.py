@@ -155,8 +155,8 @@ def test_the_limits_do_not_warn() -> None:
 
 def test_surfaces_know_their_lines() -> None:
     twice = parse("0 0 0\r\n0\n\n2\n" + "\n".join(LINES[3:8] * 2) + "\r\r2\n" + "\n".join([*LINES[9:], "", *LINES[9:]]))
-    assert [sphere.line for sphere in twice.spheres] == [5, 10]
-    assert [plane.line for plane in twice.planes] == [17, 23]
+    assert [sphere.lines for sphere in twice.spheres] == [(5, 9), (10, 14)]
+    assert [plane.lines for plane in twice.planes] == [(17, 21), (23, 27)]
 
 
 @pytest.mark.parametrize("size", [5e-324, 1e-308, 1e-200, 1.0, 3.0, 1e200, 1.7e308])
