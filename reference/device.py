@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import importlib
 import os
-import subprocess
 import sys
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +78,8 @@ def find_llvm() -> Path | None:
     """The shared library of the LLVM wheel, or None where it has none for this platform."""
     for library in sorted(Path(sys.prefix, "lib").glob("libLLVM.so.*")):
         return library
+    from importlib import metadata
+
     try:
         files = metadata.files(LLVM_PACKAGE) or []
     except metadata.PackageNotFoundError:
@@ -94,6 +94,8 @@ def _check_llvm() -> None:
         return
     if chosen in _tried:
         return
+    import subprocess
+
     trial = subprocess.run([sys.executable, "-c", _TRIAL], capture_output=True, text=True, timeout=120, check=False)
     if trial.returncode:
         if chosen and (library := find_llvm()):
