@@ -10,7 +10,6 @@ picture on disk, for crossray with a warm kernel cache.
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -30,7 +29,8 @@ from translator.registry import adapter
 from translator.run import command_line, draw, installed_version, write_export
 
 ROOT = Path(__file__).parent.parent.parent
-RUNS = 7
+RUNS = 7  # rounds, after one that does not count
+RENDERS = 5  # of crossray's in a round
 PEERS = ("povray", "mitsuba")
 
 
@@ -40,8 +40,13 @@ def seconds(action: Callable[[], object]) -> float:
     return perf_counter() - start
 
 
+def render_seconds(scene: Scene, precision: str) -> float:
+    """crossray's tracing up to the picture in memory, the median of a few."""
+    return median(seconds(partial(render, scene, precision=precision)) for _ in range(RENDERS))
+
+
 def trace_seconds(name: str, scene: Scene) -> float:
-    """What the renderer says its tracing took."""
+    """What another renderer says its tracing took."""
     renderer, settings = adapter(name), Settings()
     _, log = draw(renderer.export(scene, settings), settings, timeout=600)
     found = re.search(renderer.TIMING, log)
@@ -50,39 +55,49 @@ def trace_seconds(name: str, scene: Scene) -> float:
     return float(found[1])
 
 
-def process_seconds(path: Path, scene: Scene, folder: Path) -> tuple[float, float]:
-    """crossray's and POV-Ray's whole process on the same scene, run in turn; medians."""
+def in_turn(actions: dict[str, Callable[[], float]]) -> dict[str, list[float]]:
+    """The seconds of each action, run in turn so that a change of the machine's speed meets all alike."""
+    for action in actions.values():
+        action()
+    rounds = [{name: action() for name, action in actions.items()} for _ in range(RUNS)]
+    return {name: [times[name] for times in rounds] for name in actions}
+
+
+def ratio(theirs: list[float], ours: list[float]) -> str:
+    """The median of the ratios round by round."""
+    return f"{median(a / b for a, b in zip(theirs, ours, strict=True)):.1f}x"
+
+
+def processes(path: Path, scene: Scene, folder: Path) -> dict[str, Callable[[], float]]:
+    """crossray's and POV-Ray's whole process on the same scene."""
     export = adapter("povray").export(scene, Settings())
     write_export(export, folder)
-    ours = [sys.executable, "-m", "crossray", "render", str(path), "-o", str(folder / "scene.jpg")]
-    theirs = ["sh", "-c", "exec " + command_line(export)]
-    times: dict[str, list[float]] = {"ours": [], "theirs": []}
-    for _ in range(RUNS + 1):
-        for name, command in (("ours", ours), ("theirs", theirs)):
-            times[name].append(seconds(partial(subprocess.run, command, cwd=folder, check=True, capture_output=True)))
-    return median(times["ours"][1:]), median(times["theirs"][1:])
+    commands = {
+        "crossray": [sys.executable, "-m", "crossray", "render", str(path), "-o", str(folder / "scene.jpg")],
+        "povray": ["sh", "-c", "exec " + command_line(export)],
+    }
+    run = partial(subprocess.run, cwd=folder, check=True, capture_output=True)
+    return {name: partial(seconds, partial(run, command)) for name, command in commands.items()}
 
 
 def main() -> None:
     peers = [name for name in PEERS if installed_version(name)]
     tracing = Table("scene", *(f"{name} / crossray" for name in peers), "crossray double", "single", *peers)
-    processes = Table("scene", "povray / crossray", "crossray render", "povray")
+    whole = Table("scene", "povray / crossray", "crossray render", "povray")
     for path in sorted((ROOT / "scenes").glob("example?.txt")):
         scene = Scene.load(path)
-        ours = {
-            precision: median([seconds(partial(render, scene, precision=precision)) for _ in range(RUNS + 2)][2:])
-            for precision in ("double", "single")
-        }
-        theirs = [median(trace_seconds(name, scene) for _ in range(RUNS)) for name in peers]
-        ratios = [f"{time / ours['double']:.1f}x" for time in theirs]
-        tracing.add_row(path.stem, *ratios, *(f"{1000 * time:.1f} ms" for time in (*ours.values(), *theirs)))
-        if shutil.which("povray"):
+        ours = {name: partial(render_seconds, scene, name) for name in ("double", "single")}
+        times = in_turn(ours | {name: partial(trace_seconds, name, scene) for name in peers})
+        ratios = [ratio(times[name], times["double"]) for name in peers]
+        tracing.add_row(path.stem, *ratios, *(f"{1000 * median(taken):.1f} ms" for taken in times.values()))
+        if "povray" in peers:
             with tempfile.TemporaryDirectory(prefix="crossray-") as folder:
-                whole, povray = process_seconds(path, scene, Path(folder))
-            processes.add_row(path.stem, f"{povray / whole:.1f}x", f"{whole:.2f} s", f"{povray:.2f} s")
+                times = in_turn(processes(path, scene, Path(folder)))
+            taken = [f"{median(times[name]):.2f} s" for name in ("crossray", "povray")]
+            whole.add_row(path.stem, ratio(times["povray"], times["crossray"]), *taken)
     console = Console(width=110)
     console.print("Tracing, 1000 x 1000, three bounces, medians:", tracing)
-    console.print("Whole process, scene file to picture file, medians:", processes)
+    console.print("Whole process, scene file to picture file, medians:", whole)
 
 
 if __name__ == "__main__":
