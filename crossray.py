@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import os
 import re
+import signal
 import sys
 import warnings
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
 if TYPE_CHECKING:
     from translator.contract import Settings
 
-DONE, DISAGREES, BAD_INPUT, NOT_DONE, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, DISAGREES, BAD_INPUT, NOT_DONE, SIGNALLED = 0, 1, 2, 3, 128
 SHOWN_WARNINGS = 20
 TIMED_RUNS = 5
 
@@ -196,7 +197,7 @@ def export(
             print(f"{name}: not exported: {reason}", file=sys.stderr)
             continue
         write_export(exported, output / name)
-        print(f"cd {shlex.quote(str(output / name))} && {command_line(exported)}")
+        _print(f"(cd -- {shlex.quote(str(output / name))} && {command_line(exported)})")
         for note in exported.notes if verbose else ():
             print(f"{name}: {note}", file=sys.stderr)
     if refused and refused == len(adapters):
@@ -247,7 +248,7 @@ def check(
                 facts = {key: value for key, value in vars(outcome).items() if key != "picture"}
                 run.add_picture(entry, facts, outcome.picture)
         results = write_reports(out, advance)
-    print("\n".join(summary_lines(results)))
+    _print("\n".join(summary_lines(results)))
     _say(f"{out / 'report.html'}", quiet)
     raise typer.Exit(_exit_code(results, required))
 
@@ -275,7 +276,7 @@ def compare(
         sizes = [f"{picture.shape[1]}x{picture.shape[0]}" for picture in (right, other)]
         raise InputError(f"{b}:1:1: expected a picture of {sizes[0]} like {a}, found {sizes[1]}")
     measured = measure(right, other)
-    print(measured.as_text())
+    _print(measured.as_text())
     if out:
         run = Recording(out, _version())
         entry = run.add_scene(str(b), right.shape[1], right.shape[0], depth=None, convention=None, text=None)
@@ -318,11 +319,11 @@ def explain(
     told = [explain(loaded, CONVENTIONS[name], **pixel) for name in convention or [Convention.document]]
     if as_json:
         conventions = [dataclasses.asdict(explanation) for explanation in told]
-        print(json.dumps({"version": 1, "scene": scene, "conventions": conventions}, indent=1, allow_nan=False))
+        _print(json.dumps({"version": 1, "scene": scene, "conventions": conventions}, indent=1, allow_nan=False))
         return
-    print("\n\n".join("\n".join(ray_tree(explanation)) for explanation in told))
+    _print("\n\n".join("\n".join(ray_tree(explanation)) for explanation in told))
     for other in told[1:]:
-        print(f"\n{parting(told[0], other)}")
+        _print(f"\n{parting(told[0], other)}")
 
 
 @app.command()
@@ -333,41 +334,63 @@ def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
     crossray doctor
     """
     from reference.device import describe
-    from translator.registry import adapter, renderer_names
+    from translator.registry import NATIVE, adapter, renderer_names
     from translator.run import installed_version
 
-    healthy = True
-    for name, fine, text in describe():
-        healthy &= fine
-        print(f"{'works' if fine else 'BROKEN'}   {name}: {text}")
+    parts = describe()
+    healthy = all(fine for _, fine, _ in parts)
+    for name, fine, text in parts:
+        _print(f"{'works  ' if fine else 'BROKEN '} {name}: {text}")
     for name in renderer_names():
         version = installed_version(name)
         renderer = adapter(name)
-        state, text = ("works  ", f"{renderer.TITLE} {version}") if version else ("missing", renderer.INSTALL)
-        print(f"{state} {name}: {text}")
+        if version and name == NATIVE and not healthy:
+            _print(f"BROKEN  {name}: {renderer.TITLE} {version} needs what is broken above")
+        elif version:
+            _print(f"works   {name}: {renderer.TITLE} {version}")
+        else:
+            _print(f"missing {name}: {renderer.INSTALL}")
     raise typer.Exit(DONE if healthy else NOT_DONE)
 
 
 def main() -> None:
     """The console script."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _stop)
     try:
         app()
     except InputError as error:
         _fail(str(error), BAD_INPUT)
     except CrossrayError as error:
         _fail(str(error), NOT_DONE)
+    except OSError as error:
+        _fail(f"{error.filename or 'the system'}: {error.strerror or error}", NOT_DONE)
     except MemoryError:
         _fail("there is not enough memory for this", NOT_DONE)
-    except KeyboardInterrupt:
-        _fail("interrupted", INTERRUPTED)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(NOT_DONE)
     except Exception:
         import traceback
 
         traceback.print_exc()
         _fail("this is a mistake in crossray, please report it", NOT_DONE)
+
+
+def _stop(number: int, frame: object) -> None:
+    """End as on an error: what was begun is cleared away, what was finished stays."""
+    _fail("interrupted", SIGNALLED + number)
+
+
+def _fail(message: str, code: int) -> None:
+    print(message, file=sys.stderr)
+    sys.exit(code)
+
+
+def _print(text: str) -> None:
+    """Results to standard output; a reader that has gone away is no disagreement."""
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise FailureError(f"standard output: {error.strerror}") from error
 
 
 def _load(path: str, quiet: bool) -> Scene:
@@ -418,11 +441,6 @@ def _version() -> str:
     from importlib.metadata import version
 
     return version("crossray")
-
-
-def _fail(message: str, code: int) -> None:
-    print(message, file=sys.stderr)
-    sys.exit(code)
 
 
 if __name__ == "__main__":

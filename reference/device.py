@@ -96,8 +96,7 @@ def _check_llvm() -> None:
         return
     import subprocess
 
-    trial = subprocess.run([sys.executable, "-c", _TRIAL], capture_output=True, text=True, timeout=120, check=False)
-    if trial.returncode:
+    if subprocess.run([sys.executable, "-c", _TRIAL], capture_output=True, check=False).returncode:
         if chosen and (library := find_llvm()):
             raise DeviceError(f"{LLVM_VARIABLE}={chosen} does not work with Dr.Jit; unset it to use {library}")
         if find_llvm():

@@ -13,7 +13,7 @@ from reference.device import load_drjit
 from reference.errors import InputError
 from reference.image import quantise
 from reference.model import DOCUMENT, Model, Window
-from reference.scene import EYE, LIGHT, Plane, Scene, Sphere, Triple
+from reference.scene import EYE, LIGHT, Plane, Scene, Sphere, Triple, holds_light
 
 Surface = Sphere | Plane
 
@@ -134,7 +134,7 @@ class _Tracer:
         colour, to_light = self.Vector(*surface.colour), self.Vector(*LIGHT) - point
         ambient = model.ambient(colour, self.Vector(*self.scene.ambient), self.scene.ambient_coefficient)
         cosine = float(model.cosine(normal, to_light))
-        crossings = self.cross(point, to_light, model.shadow, hit) if cosine else []
+        crossings = self.cross(point, to_light, model.shadow, hit, shadow=True) if cosine else []
         blockers = tuple(crossing for crossing in crossings if crossing.counted)
         diffuse = self.Vector(0) if blockers else model.diffuse(colour, surface.diffuse, cosine)
         shaded = replace(
@@ -152,22 +152,27 @@ class _Tracer:
         )
         return shaded, point, normal
 
-    def cross(self, origin: Any, d: Any, window: Window, leaving: int | None) -> list[Crossing]:
-        """Every surface that the ray's line meets or could meet, in the scene's order."""
+    def cross(self, origin: Any, d: Any, window: Window, leaving: int | None, shadow: bool = False) -> list[Crossing]:
+        """Every surface and where the ray's line meets it, in the scene's order."""
         return [
-            self._cross(name, surface, origin, d, window, place == leaving)
+            self._cross(name, surface, origin, d, window, place == leaving, shadow)
             for place, (name, surface) in enumerate(self.surfaces)
         ]
 
-    def _cross(self, name: str, surface: Surface, origin: Any, d: Any, window: Window, left: bool) -> Crossing:
+    def _cross(
+        self, name: str, surface: Surface, origin: Any, d: Any, window: Window, left: bool, shadow: bool
+    ) -> Crossing:
+        """As the tracer does: where the light is on the surface itself, a shadow ray's t = 1 is exact."""
         if isinstance(surface, Sphere):
             p, dd = origin - self.Vector(*surface.centre), d @ d
             roots = [float(t) for t in self.model.sphere_distances(p, d, dd, surface.radius, left)]
+            if shadow and holds_light(surface):
+                roots = [0.0 if left else (p @ p - surface.radius**2) / dd]
             counted = [t for t in roots if window.sphere(t, left)]
         else:
             normal = self.Vector(*surface.unit_normal)
-            facing = float(d @ normal)
             q = self.Vector(*surface.point) - origin
+            facing = float(q @ normal) - surface.distance_from(LIGHT) if shadow else float(d @ normal)
             roots = [float(self.model.plane_distance(q, normal, facing, left))] if facing else []
             counted = [t for t in roots if window.plane(t, facing, left)]
         return Crossing(name, tuple(filter(math.isfinite, roots)), tuple(filter(math.isfinite, counted)))

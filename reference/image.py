@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.errors import InputError
+from reference.errors import DeviceError, InputError
 from reference.files import replacing
 
 JPEG = (".jpg", ".jpeg")
+LARGEST_JPEG = 65500  # pixels a side
 FORMATS = (*JPEG, ".png", ".exr")
 
 Picture = NDArray[np.floating[Any]]
@@ -44,6 +45,8 @@ def write_image(path: str | Path, levels: Picture) -> None:
         pixels: NDArray[Any] = np.ascontiguousarray(levels, np.float32) / np.float32(255)
     else:
         pixels = quantise(levels)
+    if max(pixels.shape) > LARGEST_JPEG and Path(path).suffix.lower() in JPEG:
+        raise InputError(f"{path}: expected at most {LARGEST_JPEG} pixels a side for a JPEG; PNG and EXR can be larger")
     with replacing(path) as temporary:
         if Path(path).suffix.lower() in JPEG:
             temporary.write_bytes(_encode_jpeg(pixels))
@@ -110,9 +113,11 @@ def read_image(path: str | Path) -> Picture:
 
 
 def show_window(levels: Picture) -> None:
-    """Show the picture in a Matplotlib window, pixel for pixel in colour."""
+    """Show the picture in a Matplotlib window. Raises DeviceError where there is no display."""
     import matplotlib.pyplot as plt
 
+    if plt.get_backend().lower() == "agg":
+        raise DeviceError("the picture cannot be shown: there is no display")
     plt.imshow(quantise(levels))
     plt.axis("off")
     plt.show()

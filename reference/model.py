@@ -20,6 +20,7 @@ Mask = Any
 
 SHIFT = 1e-4  # "shifted a little": the document's smallest distance for shadow and reflected rays
 GRAZING = 1e-6  # the document's "epsilon": planes with |d.n| up to this are missed
+ROUNDING = 1e-15  # what rounding leaves of d.n for a unit direction that is parallel to a plane
 
 
 @dataclass(frozen=True)
@@ -144,10 +145,10 @@ DOCUMENT = Model(
 EXACT = replace(
     DOCUMENT,
     name="exact",
-    summary="no epsilons: only the surface that a ray leaves is excluded, symbolically",
-    camera=beyond(1, 0),
+    summary="no epsilons beyond rounding: only the surface that a ray leaves is excluded, symbolically",
+    camera=beyond(1, 100 * ROUNDING),  # the camera's directions are about 100 long
     shadow=before_light(0, 0),
-    reflection=beyond(0, 0),
+    reflection=beyond(0, ROUNDING),
 )
 
 PUBLISHED_GRAZING = 0.001

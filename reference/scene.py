@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import hypot
+from math import dist, hypot, isclose
 from pathlib import Path
 from typing import TypeVar
 
@@ -48,6 +48,13 @@ class Plane:
         x, y, z = (value / largest for value in self.normal)
         length = hypot(x, y, z)
         return (x / length, y / length, z / length)
+
+    def distance_from(self, origin: Triple) -> float:
+        """(point - origin) . unit_normal, rounded only at the end: 0 exactly if `origin` lies in the plane."""
+        largest = max(abs(value) for value in self.normal)
+        normal = [exact(value) / exact(largest) for value in self.normal]
+        arm = [exact(a) - exact(b) for a, b in zip(self.point, origin, strict=True)]
+        return float(sum(a * b for a, b in zip(arm, normal, strict=True))) / hypot(*map(float, normal))
 
 
 Surface = TypeVar("Surface", Sphere, Plane)
@@ -107,6 +114,14 @@ def _first_of_each(surfaces: tuple[Surface, ...], identities: list[tuple[object,
     for number, identity in enumerate(identities, 1):
         first.setdefault(identity, number)
     return {number: surfaces[number - 1] for number in first.values()}
+
+
+def holds_light(sphere: Sphere) -> bool:
+    """Whether the light lies exactly on the sphere."""
+    if not isclose(dist(sphere.centre, LIGHT), sphere.radius, rel_tol=1e-9):
+        return False
+    arm = [exact(a) - exact(b) for a, b in zip(sphere.centre, LIGHT, strict=True)]
+    return sum(value * value for value in arm) == exact(sphere.radius) ** 2
 
 
 def _plane_identity(plane: Plane) -> tuple[Fraction, ...]:

@@ -44,7 +44,8 @@ def load(path: str | Path) -> Scene:
 
 def parse(text: str | bytes, path: str = "<text>") -> Scene:
     """Read a scene from text or from the bytes of a file (UTF-8, with or without a byte order mark)."""
-    reader = _Reader(_decode(text, path) if isinstance(text, bytes) else text, path)
+    text = _decode(text, path) if isinstance(text, bytes) else text.removeprefix("\ufeff")
+    reader = _Reader(text, path)
     ambient = reader.colour("the ambient colour")
     coefficient = reader.coefficient("the ambient coefficient")
     spheres = tuple(reader.sphere(f"sphere {i + 1}") for i in range(reader.count("spheres")))

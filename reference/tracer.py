@@ -17,11 +17,12 @@ from numpy.typing import DTypeLike, NDArray
 from reference.device import Types, array_types
 from reference.errors import InputError
 from reference.model import DOCUMENT, Mask, Model, Number, Vector, Window
-from reference.scene import EYE, LARGEST_DEPTH, LARGEST_SIDE, LIGHT, Plane, Scene, Sphere
+from reference.scene import EYE, LARGEST_DEPTH, LARGEST_SIDE, LIGHT, Plane, Scene, Sphere, holds_light
 
 UNROLLED = 16  # surfaces; beyond this, compile time outweighs what straight code gains
 BAND = 1 << 22  # pixels a kernel launch, which bounds the memory of large pictures
 NOTHING = 0xFFFFFFFF  # the index of no surface
+LARGEST_NUMBER = {"double": 1e100, "single": 1e12}  # of a coordinate: products of several must stay finite
 
 State = tuple[Number, ...]
 
@@ -46,7 +47,9 @@ def render(
         raise InputError(f"expected a size of 1 to {LARGEST_SIDE} pixels a side, found {width}x{height}")
     if not 0 <= depth <= LARGEST_DEPTH:
         raise InputError(f"expected a depth of 0 to {LARGEST_DEPTH}, found {depth}")
-    world = World(scene, model, array_types(precision, device))
+    types = array_types(precision, device)
+    _check_magnitudes(scene, precision)
+    world = World(scene, model, types)
     limit = dr.opaque(world.Index, depth)
     picture = np.empty((height, width, 3), dtype)
     rows = max(1, BAND // width)
@@ -60,6 +63,15 @@ def render(
     return picture
 
 
+def _check_magnitudes(scene: Scene, precision: str) -> None:
+    """Raise InputError for coordinates so large that their squares would overflow unseen."""
+    largest = LARGEST_NUMBER[precision]
+    coordinates = [value for s in scene.spheres for value in (*s.centre, s.radius)]
+    coordinates += [value for p in scene.planes for value in p.point]
+    if (found := max(map(abs, coordinates), default=0.0)) > largest:
+        raise InputError(f"expected coordinates up to {largest:g} in {precision} precision, found {found:g}")
+
+
 class World:
     """A scene on the device and the model that reads it."""
 
@@ -70,8 +82,9 @@ class World:
         self.Vector, self.Packet = types.Vector3, types.Vector4
         surfaces: list[Sphere | Plane] = [*scene.spheres, *scene.planes]
         self.spheres, self.surfaces = len(scene.spheres), len(surfaces)
-        geometry: list[State] = [(*s.centre, s.radius, 0, 0, 0, 0) for s in scene.spheres]
-        geometry += [(*p.point, 0, *p.unit_normal, 0) for p in scene.planes]
+        self.light_on_sphere = any(map(holds_light, scene.spheres))
+        geometry: list[State] = [(*s.centre, s.radius, holds_light(s), 0, 0, 0) for s in scene.spheres]
+        geometry += [(*p.point, 0, *p.unit_normal, p.distance_from(LIGHT)) for p in scene.planes]
         materials: list[State] = [(*s.colour, s.diffuse, s.reflection, 0, 0, 0) for s in surfaces]
         self.geometry, self.materials = self._table(geometry), self._table(materials)
         self.uniform = [[self._uniform(value) for value in row] for row in geometry[: UNROLLED + 1]]
@@ -188,14 +201,17 @@ def blocked(world: World, origin: Vector, d: Vector, leaving: Number, active: Ma
     model, window, dd = world.model, world.model.shadow, dr.dot(d, d)
 
     def meet_sphere(index: Number, row: list[Number], dark: Mask) -> State:
-        left = leaving == index
-        near, far = model.sphere_distances(origin - world.Vector(*row[:3]), d, dd, row[3], left)
+        left, p = leaving == index, origin - world.Vector(*row[:3])
+        near, far = model.sphere_distances(p, d, dd, row[3], left)
+        if world.light_on_sphere:  # t = 1 is one root, exactly; the product of both is (p.p - r^2) / d.d
+            other = dr.select(left, 0, dr.fma(-row[3], row[3], dr.dot(p, p))) / dd
+            near, far = (dr.select(row[4] != 0, other, t) for t in (near, far))
         return (dark | window.sphere(near, left) | window.sphere(far, left),)
 
     def meet_plane(index: Number, row: list[Number], dark: Mask) -> State:
-        left, normal = leaving == index, world.Vector(*row[4:7])
-        facing = dr.dot(d, normal)
-        t = model.plane_distance(world.Vector(*row[:3]) - origin, normal, facing, left)
+        left, normal, q = leaving == index, world.Vector(*row[4:7]), world.Vector(*row[:3]) - origin
+        facing = dr.dot(q, normal) - row[7]  # d.n, so that t = 1 exactly for a plane that holds the light
+        t = model.plane_distance(q, normal, facing, left)
         return (dark | window.plane(t, facing, left),)
 
     lit = (world.Mask(False),)

@@ -18,7 +18,7 @@ PACKAGES = ("reference", "translator", "reports")
 ALLOWED = {
     "translator.renderers": ("reference.scene", "reference.text", "translator.contract"),
     "translator": ("reference.errors", "reference.files", "reference.image", "reference.scene", "translator"),
-    "reports": ("reference.errors", "reference.files", "reference.image", "reports"),
+    "reports": ("reference", "reports"),
     "reference": ("reference",),
 }
 

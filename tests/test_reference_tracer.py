@@ -15,9 +15,10 @@ import transcription
 import reference
 from reference import device, tracer
 from reference.errors import DeviceError, InputError
+from reference.explanation import explain
 from reference.image import quantise, read_image
-from reference.model import CONVENTIONS, DOCUMENT, EXACT, PUBLISHED
-from reference.scene import Plane, Scene, Sphere
+from reference.model import CONVENTIONS, DOCUMENT, EXACT, PUBLISHED, Model
+from reference.scene import Plane, Scene, Sphere, Triple
 from reference.text import dump, parse
 from reference.tracer import render
 
@@ -204,7 +205,10 @@ def test_the_documents_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setenv("MPLBACKEND", "agg")
     scene = Scene.load(SCENES / "example1.txt")
     scene.render()
+    with pytest.raises(DeviceError, match="no display"):
+        scene.render(show=True)
     assert not shown
+    monkeypatch.setattr("matplotlib.pyplot.get_backend", lambda: "tkagg")
     scene.render(show=True)
     assert shown
     picture = read_image(tmp_path / "scene.jpg")
@@ -241,3 +245,38 @@ def test_drjit_imported_first_does_not_abort_the_process() -> None:
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
     )
     assert result.stdout.strip() == "0.0" or "LLVM" in result.stdout
+
+
+@pytest.mark.parametrize("normal", [(1, 0, -1), (1, -1, 0), (2, -1, -1), (3, -4, 1)])
+def test_a_plane_through_the_light_shades_nothing(normal: tuple[int, int, int]) -> None:
+    """At the light t is 1, which does not block; rounding must not decide."""
+    ball = Sphere((200, 100, 50), (20, -30, 300), 60, 1, 0.2)
+    through = Plane((0, 0, 0), (500, 500, 500), normal, 0, 0)
+    alone = render(Scene((0, 0, 0), 0, (ball,), (FLOOR,)), EXACT, width=100, height=100, depth=0, dtype=float)
+    both = render(Scene((0, 0, 0), 0, (ball,), (FLOOR, through)), EXACT, width=100, height=100, depth=0, dtype=float)
+    seen = (both > 0).any(axis=-1)
+    assert np.count_nonzero(seen) > 500
+    assert np.array_equal(both[seen], alone[seen])
+
+
+@pytest.mark.parametrize("ball", [((480, 470, 440), 70), ((400, 300, 300), 300)])
+@pytest.mark.parametrize("model", [DOCUMENT, EXACT], ids=lambda model: model.name)
+def test_a_sphere_through_the_light_shades_by_its_other_root(ball: tuple[Triple, float], model: Model) -> None:
+    through = Sphere((200, 100, 50), *ball, 1, 0)
+    scene = Scene((0, 0, 0), 0, (through,), (Plane((90, 90, 90), (0, 0, 900), (0, 0, -1), 1, 0), FLOOR))
+    drawn = render(scene, model, width=100, height=100, depth=0, dtype=float)
+    assert worst(drawn, transcription.picture(dump(scene), 100, 100, 0, "exact")) < 1e-6
+    for column, row in [(5, 5), (90, 3), (50, 60)]:
+        told = explain(scene, model, column=column, row=row, width=100, height=100, depth=0)
+        assert told.colour == pytest.approx(drawn[row, column])
+
+
+def test_a_camera_ray_along_a_plane_misses_it() -> None:
+    scene = Scene((255, 255, 255), 1, (), (Plane((255, 0, 0), (0, -100, 0), (1, 1, 0), 0, 0),))
+    drawn = render(scene, EXACT, width=32, height=32)
+    assert not drawn[range(32), range(32)].any()
+
+
+def test_coordinates_too_large_to_square() -> None:
+    with pytest.raises(InputError, match=r"coordinates up to 1e\+100 in double precision, found 1e\+200"):
+        render(Scene((0, 0, 0), 0, (Sphere((1, 1, 1), (0, 0, 1e200), 1, 1, 0),)))

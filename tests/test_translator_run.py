@@ -135,7 +135,7 @@ def test_version_is_asked_once(draw: Draw, tmp_path: Path) -> None:
 
 def test_exit_code(draw: Draw) -> None:
     outcome = draw(COPY + "print('out of luck')\nprint('bad sign', file=sys.stderr)\nsys.exit(7)")
-    assert (outcome.status, outcome.reason) == ("failed", "it failed with exit code 7")
+    assert (outcome.status, outcome.reason) == ("failed", "it failed with exit code 7: out of luck")
     assert sorted(outcome.log.splitlines()) == ["bad sign", "out of luck"]
     assert (outcome.version, outcome.picture, outcome.notes) == ("1.2", None, ("a note",))
     assert outcome.seconds
@@ -160,7 +160,11 @@ open(os.path.join(OUTSIDE, "processes"), "w").write(f"{os.getpid()} {child.pid}"
 
 def test_timeout_leaves_no_process(draw: Draw, tmp_path: Path) -> None:
     outcome = draw(FORK + "print('still there', flush=True)\ntime.sleep(60)", timeout=2)
-    assert (outcome.status, outcome.reason, outcome.log) == ("failed", "it ran out of time (2 s)", "still there\n")
+    assert (outcome.status, outcome.reason, outcome.log) == (
+        "failed",
+        "it ran out of time (2 s): still there",
+        "still there\n",
+    )
     assert outcome.seconds is not None
     assert 2 <= outcome.seconds < 8
     processes = (tmp_path / "outside/processes").read_text(encoding="ascii").split()
@@ -201,7 +205,7 @@ def test_no_usable_picture(draw: Draw, tmp_path: Path, levels: Picture, case: st
 def test_picture_of_the_wrong_size(draw: Draw, tmp_path: Path) -> None:
     write_image(tmp_path / "outside/good.png", np.zeros((8, 6, 3)))
     outcome = draw("print('done')\nshutil.copy(OUTSIDE + '/good.png', 'scene.png')", image="scene.png")
-    assert (outcome.status, outcome.reason) == ("failed", "expected a picture of 8x6, found 6x8")
+    assert (outcome.status, outcome.reason) == ("failed", "expected a picture of 8x6, found 6x8: done")
     assert (outcome.picture, outcome.log) == (None, "done\n")
 
 

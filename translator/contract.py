@@ -20,6 +20,7 @@ from typing import Protocol
 from reference.errors import CrossrayError
 from reference.scene import Scene
 
+SMALLEST, LARGEST = 1e-25, 1e25  # of colours and coefficients in single precision, so that products stay in range
 PYTHON = "python"  # as the first word of a command: the Python that runs crossray
 
 
@@ -57,6 +58,13 @@ def number(value: float) -> str:
     if not math.isfinite(value):
         raise Unsupported("the scene's numbers are so large that their products overflow")
     return repr(float(value))
+
+
+def single(value: float) -> str:
+    """A number for a renderer that keeps it in single precision. Raises Unsupported where that would lose it."""
+    if value and not SMALLEST <= abs(value) <= LARGEST:
+        raise Unsupported(f"single precision cannot keep apart colours and coefficients as far from 1 as {value:g}")
+    return number(value)
 
 
 class Adapter(Protocol):

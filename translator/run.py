@@ -22,7 +22,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.errors import InputError, RendererError
+from reference.errors import InputError, OutputError, RendererError
 from reference.files import make_folder, write_text
 from reference.image import read_image
 from reference.scene import Scene
@@ -67,17 +67,18 @@ def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 6
     start = time.perf_counter()
     try:
         picture, log = draw(export, settings, timeout)
-    except RendererError as error:
+    except (RendererError, OutputError, OSError) as error:
         seconds = time.perf_counter() - start
+        log = error.log if isinstance(error, RendererError) else ""
         return Outcome(
             name,
             renderer.TITLE,
             FAILED,
             version,
-            str(error),
+            _reason(str(error), log),
             seconds,
             command=command,
-            log=error.log,
+            log=log,
             notes=export.notes,
         )
     seconds = time.perf_counter() - start
@@ -86,6 +87,12 @@ def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 6
     return Outcome(
         name, renderer.TITLE, RENDERED, version, None, seconds, trace_seconds, picture, command, log, export.notes
     )
+
+
+def _reason(message: str, log: str) -> str:
+    """What went wrong, with the last that the renderer said."""
+    last = next((line.strip() for line in reversed(log.splitlines()) if line.strip()), "")
+    return f"{message}: {last[:200]}" if last else message
 
 
 def draw(export: Export, settings: Settings, timeout: float) -> tuple[NDArray[np.floating[Any]], str]:

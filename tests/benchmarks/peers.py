@@ -13,7 +13,7 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -55,7 +55,7 @@ def trace_seconds(name: str, scene: Scene) -> float:
     return float(found[1])
 
 
-def in_turn(actions: dict[str, Callable[[], float]]) -> dict[str, list[float]]:
+def in_turn(actions: Mapping[str, Callable[[], float]]) -> dict[str, list[float]]:
     """The seconds of each action, run in turn so that a change of the machine's speed meets all alike."""
     for action in actions.values():
         action()
@@ -68,7 +68,7 @@ def ratio(theirs: list[float], ours: list[float]) -> str:
     return f"{median(a / b for a, b in zip(theirs, ours, strict=True)):.1f}x"
 
 
-def processes(path: Path, scene: Scene, folder: Path) -> dict[str, Callable[[], float]]:
+def processes(path: Path, scene: Scene, folder: Path) -> Mapping[str, Callable[[], float]]:
     """crossray's and POV-Ray's whole process on the same scene."""
     export = adapter("povray").export(scene, Settings())
     write_export(export, folder)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from reference.scene import (
+    EYE,
     LIGHT,
     SCREEN,
     SCREEN_DISTANCE,
@@ -13,7 +16,7 @@ from reference.scene import (
     distinct_planes,
     distinct_spheres,
 )
-from translator.contract import Export, Settings, Unsupported, number
+from translator.contract import Export, Settings, Unsupported, number, single
 
 TITLE = "POV-Ray"
 INSTALL = "apt-get install povray"
@@ -23,6 +26,8 @@ TIMING = r"Trace Time:.*\(([0-9.]+) seconds\)"
 UNIT = 0.1  # POV-Ray's tolerances are absolute (1e-4 for reflections, 1e-3 for shadows) and suit this scale
 DEEPEST = 255  # bounces: max_trace_level stops at 256
 FARTHEST = 1e7 / UNIT  # POV-Ray ignores hits beyond 1e7 of its units
+FARTHEST_PLANE = 1e5  # of a plane: slanting rays meet it much farther away
+LIGHT_GAP = 1e-6  # between a sphere and the light
 
 HEADER = """\
 // {title}
@@ -77,12 +82,17 @@ def export(scene: Scene, settings: Settings) -> Export:
 def _refuse(spheres: dict[int, Sphere], planes: dict[int, Plane], settings: Settings) -> None:
     if settings.depth > DEEPEST:
         raise Unsupported(f"POV-Ray follows at most {DEEPEST} bounces, not {settings.depth}")
+    for name, surface in _named(spheres, planes):
+        if surface.diffuse < 0 or surface.reflection < 0:
+            raise Unsupported(f"POV-Ray ignores negative coefficients: {name} has one")
     for place, sphere in spheres.items():
         if max(map(abs, sphere.centre)) + sphere.radius > FARTHEST:
             raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: sphere {place} reaches farther")
+        if abs(math.dist(sphere.centre, LIGHT) - sphere.radius) < LIGHT_GAP:
+            raise Unsupported(f"POV-Ray decides by rounding whether sphere {place} hides the light, which lies on it")
     for place, plane in planes.items():
-        if abs(_offset(plane)) > FARTHEST / 3:  # slanting rays go farther
-            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: plane {place} lies too far from the eye")
+        if abs(plane.distance_from(EYE)) > FARTHEST_PLANE:
+            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}, where rays along plane {place} would meet it")
 
 
 def _sphere(name: str, sphere: Sphere) -> str:
@@ -91,38 +101,39 @@ def _sphere(name: str, sphere: Sphere) -> str:
 
 
 def _plane(name: str, plane: Plane) -> str:
-    normal, offset = plane.unit_normal, _offset(plane)
+    normal, offset = plane.unit_normal, plane.distance_from(EYE)
     middle = SCREEN_DISTANCE * normal[2]  # n.d over the screen is middle -+ spread; the plane is met at offset / n.d
     spread = SCREEN * (abs(normal[0]) + abs(normal[1]))
     near = middle + spread >= offset if offset > 0 else middle - spread <= offset
-    return _object(name, f"plane {{ {_vector(normal)}, {number(offset)}*Unit", plane, near)
+    hidden = spread == 0 and offset == middle  # on the screen itself, where t = 1 does not count
+    return _object(name, f"plane {{ {_vector(normal)}, {number(offset)}*Unit", plane, near, hidden)
 
 
-def _object(name: str, shape: str, surface: Sphere | Plane, near: bool) -> str:
+def _object(name: str, shape: str, surface: Sphere | Plane, near: bool, hidden: bool = False) -> str:
     """One object; where camera rays can meet it before the screen, one for the camera and one for all other rays."""
     texture = _texture(surface)
     if not near:
         return f"// {name}\n{shape}\n{texture}}}\n"
     clip = f"  clipped_by {{ plane {{ -z, -{SCREEN_DISTANCE}*Unit }} }}  // the camera sees nothing before the screen\n"
-    return (
-        f"// {name}, as the camera sees it\n{shape}\n{texture}{clip}  no_shadow no_reflection\n}}\n"
-        f"// {name}, as shadows and mirrors see it\n{shape}\n{texture}  no_image\n}}\n"
-    )
+    seen = f"// {name}, as the camera sees it\n{shape}\n{texture}{clip}  no_shadow no_reflection\n}}\n"
+    rest = f"// {name}, as shadows and mirrors see it\n{shape}\n{texture}  no_image\n}}\n"
+    return rest if hidden else seen + rest
 
 
 def _texture(surface: Sphere | Plane) -> str:
     """The pair `diffuse front, back` swapped for the inside: the given normal shades both sides."""
-    pigment = f"pigment {{ rgb {_vector(surface.colour)}/255 }}"
-    outside, inside = _finish(number(surface.diffuse), surface), _finish(f"0, {number(surface.diffuse)}", surface)
+    pigment = f"pigment {{ rgb <{', '.join(map(single, surface.colour))}>/255 }}"
+    outside, inside = _finish(single(surface.diffuse), surface), _finish(f"0, {single(surface.diffuse)}", surface)
     return f"  texture {{ {pigment} {outside} }}\n  interior_texture {{ {pigment} {inside} }}\n"
 
 
 def _finish(diffuse: str, surface: Sphere | Plane) -> str:
-    return f"finish {{ ambient 1 diffuse {diffuse} specular 0 phong 0 reflection {{ {number(surface.reflection)} }} }}"
+    return f"finish {{ ambient 1 diffuse {diffuse} specular 0 phong 0 reflection {{ {single(surface.reflection)} }} }}"
 
 
-def _offset(plane: Plane) -> float:
-    return sum(a * b for a, b in zip(plane.unit_normal, plane.point, strict=True))
+def _named(spheres: dict[int, Sphere], planes: dict[int, Plane]) -> list[tuple[str, Sphere | Plane]]:
+    named: list[tuple[str, Sphere | Plane]] = [(f"sphere {place}", sphere) for place, sphere in spheres.items()]
+    return named + [(f"plane {place}", plane) for place, plane in planes.items()]
 
 
 def _vector(values: Triple | tuple[float, ...]) -> str:

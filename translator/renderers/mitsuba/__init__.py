@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from importlib import resources
+from itertools import combinations
 from typing import Any
 
 from reference.scene import (
+    EYE,
     LIGHT,
     SCREEN,
     SCREEN_DISTANCE,
@@ -17,7 +19,7 @@ from reference.scene import (
     distinct_planes,
     distinct_spheres,
 )
-from translator.contract import PYTHON, Export, Settings, Unsupported, number
+from translator.contract import PYTHON, Export, Settings, Unsupported, number, single
 
 TITLE = "Mitsuba 3"
 INSTALL = "pip install mitsuba"
@@ -26,10 +28,16 @@ TIMING = r"traced in ([0-9.e-]+) s"
 
 MIRROR_SHARE = 1 - 2.0**-23  # of the blended BSDF: the rest is the smallest share that float32 keeps apart
 PLANE_RADIUS = 1e9  # a plane is a disk of this radius
-DEEPEST = 16  # bounces: beyond, single precision rays between mirrors stray too far
-LIGHT_GAP = 0.5  # shadow rays end a little before the light, by less than this
-FARTHEST = 1e6  # single precision: beyond, hit points are off by more than a tenth of a unit
-LARGEST_RADIUS = 2000  # single precision: the surface of a larger sphere shades itself
+# What single precision carries, found by comparing pictures.
+COARSE = "Mitsuba's single precision is too coarse"
+DEEPEST = 16  # bounces
+DEEPEST_BETWEEN_BALLS = 4  # bounces, where several spheres mirror each other and each magnifies the error
+FARTHEST = 1e6  # of a sphere
+FARTHEST_PLANE = 1e4  # slanting rays meet it much farther away
+LARGEST_RADIUS = 2000  # the surface of a larger sphere shades itself
+SPHERE_LIGHT_GAP = 25  # grazing shadow rays end that much before the light
+PLANE_LIGHT_GAP = 0.5
+APART = 1e-3  # between surfaces that look alike
 
 HEADER = """\
 <!-- A scene of the recursive ray tracing assignment, for Mitsuba 3.
@@ -116,25 +124,46 @@ def export(scene: Scene, settings: Settings) -> Export:
 
 
 def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:
-    """Single precision bounds how deep, how far and how near the light a scene may go."""
-    coarse = "Mitsuba's single precision is too coarse"
-    if settings.depth > DEEPEST:
-        raise Unsupported(f"{coarse} for {settings.depth} bounces (at most {DEEPEST})")
-    offsets = {name: _dot(plane.unit_normal, plane.point) for name, plane in planes.items()}
-    reach = {name: max(map(abs, sphere.centre)) + sphere.radius for name, sphere in spheres.items()}
-    reach |= {name: abs(offset) for name, offset in offsets.items()}
-    for name, distance in reach.items():
-        if not distance <= FARTHEST:
-            raise Unsupported(f"{coarse} beyond {FARTHEST:g}: {name} reaches {distance:g}")
+    """Single precision bounds how deep, how far, how close together and how near the light a scene may go."""
+    balls = sum(sphere.reflection != 0 for sphere in spheres.values())
+    deepest = DEEPEST if balls < 2 else DEEPEST_BETWEEN_BALLS
+    if settings.depth > deepest:
+        mirrors = "" if balls < 2 else f" between {balls} mirroring spheres"
+        raise Unsupported(f"{COARSE} for {settings.depth} bounces{mirrors} (at most {deepest})")
     for name, sphere in spheres.items():
+        if max(map(abs, sphere.centre)) + sphere.radius > FARTHEST:
+            raise Unsupported(f"{COARSE} beyond {FARTHEST:g}: {name} reaches farther")
         if sphere.radius > LARGEST_RADIUS:
-            raise Unsupported(f"{coarse} for a radius over {LARGEST_RADIUS}: {name} has {sphere.radius:g}")
-    gaps = {name: math.dist(sphere.centre, LIGHT) - sphere.radius for name, sphere in spheres.items()}
-    gaps |= {name: _dot(plane.unit_normal, LIGHT) - offsets[name] for name, plane in planes.items()}
-    for name, gap in gaps.items():
-        if abs(gap) < LIGHT_GAP:
-            short = f"Mitsuba's shadow rays end {LIGHT_GAP:g} short of the light"
-            raise Unsupported(f"{short}: {name} passes within {abs(gap):g}")
+            raise Unsupported(f"{COARSE} for a radius over {LARGEST_RADIUS}: {name} has {sphere.radius:g}")
+        if abs(gap := math.dist(sphere.centre, LIGHT) - sphere.radius) < SPHERE_LIGHT_GAP:
+            raise Unsupported(f"{COARSE} within {SPHERE_LIGHT_GAP} of the light: {name} passes at {abs(gap):g}")
+    for name, plane in planes.items():
+        x, y, z = plane.unit_normal
+        offset = plane.distance_from(EYE)
+        if abs(offset) > FARTHEST_PLANE:
+            raise Unsupported(f"{COARSE} beyond {FARTHEST_PLANE:g}: {name} is {abs(offset):g} from the eye")
+        if abs(gap := plane.distance_from(LIGHT)) < PLANE_LIGHT_GAP:
+            raise Unsupported(f"{COARSE} within {PLANE_LIGHT_GAP} of the light: {name} passes at {abs(gap):g}")
+        if abs(x) + abs(y) < APART / SCREEN and abs(offset - SCREEN_DISTANCE * z) < APART:
+            raise Unsupported(f"{COARSE} to tell {name} from the screen")
+    _refuse_close_pairs(spheres, planes)
+
+
+def _refuse_close_pairs(spheres: dict[str, Sphere], planes: dict[str, Plane]) -> None:
+    """Surfaces that single precision cannot tell apart; spheres are compared along x first."""
+    ordered = sorted(spheres.items(), key=lambda item: item[1].centre[0])
+    for place, (name, one) in enumerate(ordered):
+        for other_name, other in ordered[place + 1 :]:
+            if other.centre[0] - one.centre[0] >= APART:
+                break
+            if math.dist(one.centre, other.centre) + abs(one.radius - other.radius) < APART:
+                raise Unsupported(f"{COARSE} to tell {name} from {other_name}")
+    for (name, plane), (other_name, other_plane) in combinations(planes.items(), 2):
+        normal, other_normal = plane.unit_normal, other_plane.unit_normal
+        sign = math.copysign(1, sum(a * b for a, b in zip(normal, other_normal, strict=True)))
+        turned = math.dist(normal, [sign * value for value in other_normal])
+        if turned < APART / SCREEN and abs(plane.distance_from(EYE) - sign * other_plane.distance_from(EYE)) < APART:
+            raise Unsupported(f"{COARSE} to tell {name} from {other_name}")
 
 
 def _surface(name: str, shape: str, geometry: str, surface: Sphere | Plane, light: list[float]) -> str:
@@ -157,20 +186,20 @@ def _ball(sphere: Sphere) -> str:
 
 def _frame(plane: Plane) -> str:
     """The unit disk, widened and turned by a rotation of full precision (`lookat` would lose digits of the normal)."""
-    normal = plane.unit_normal
+    normal, offset = plane.unit_normal, plane.distance_from(EYE)
     axis = [float(index == min(range(3), key=lambda i: abs(normal[i]))) for index in range(3)]
     across = _unit(_cross(axis, normal))
     along = _cross(normal, across)
-    rows = [
-        [PLANE_RADIUS * u, PLANE_RADIUS * v, n, p]
-        for u, v, n, p in zip(across, along, normal, plane.point, strict=True)
-    ]
+    centre = [value * offset + 0.0 for value in normal]  # nearest the eye; never -0.0
+    widened = ([PLANE_RADIUS * value for value in axis] for axis in (across, along))
+    rows = [list(row) for row in zip(*widened, normal, centre, strict=True)]
     matrix = "  ".join(_spaced(row) for row in [*rows, [0.0, 0.0, 0.0, 1.0]])
     return f'<transform name="to_world"><matrix value="{matrix}"/></transform>'
 
 
 def _constant(name: str, values: list[float]) -> str:
-    return f'<texture type="rawconstant" name="{name}"><vector name="value" value="{_spaced(values)}"/></texture>'
+    value = " ".join(map(single, values))
+    return f'<texture type="rawconstant" name="{name}"><vector name="value" value="{value}"/></texture>'
 
 
 def _cross(a: Any, b: Any) -> Triple:
@@ -184,7 +213,3 @@ def _unit(a: Triple) -> Triple:
 
 def _spaced(values: Any) -> str:
     return " ".join(map(number, values))
-
-
-def _dot(a: Triple, b: Triple) -> float:
-    return sum(x * y for x, y in zip(a, b, strict=True))

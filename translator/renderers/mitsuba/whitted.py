@@ -9,15 +9,18 @@ The scene file uses Mitsuba's own shapes, BSDFs, emitters, sensor and film; what
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import statistics
-import sys
 import time
+from importlib import metadata
 from pathlib import Path
 
 # Dr.Jit needs an LLVM and aborts with some that systems ship; the wheel karellen-llvm-core brings one that works.
-for library in sorted(Path(sys.prefix, "lib").glob("libLLVM.so.*")):
-    os.environ.setdefault("DRJIT_LIBLLVM_PATH", str(library))
+with contextlib.suppress(metadata.PackageNotFoundError):
+    for file in metadata.files("karellen-llvm-core") or []:
+        if file.name.startswith("libLLVM.so."):
+            os.environ.setdefault("DRJIT_LIBLLVM_PATH", str(Path(str(file.locate())).resolve()))
 
 import drjit as dr
 import mitsuba as mi
