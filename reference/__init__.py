@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from reference.device import provide_llvm
+from reference.device import load_drjit, provide_llvm
 from reference.errors import CrossrayError, SceneError, SceneWarning
 from reference.scene import Plane, Scene, Sphere
 
@@ -37,8 +37,6 @@ def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
-
-    from reference.device import load_drjit
 
     load_drjit()
     return getattr(import_module(f"reference.{_LAZY[name]}"), name)

@@ -99,21 +99,23 @@ def merge_coincident(scene: Scene) -> Scene:
     )
 
 
-def distinct_spheres(scene: Scene) -> dict[int, Sphere]:
-    """The spheres that `merge_coincident` keeps, by their number in the file, from 1."""
-    return _first_of_each(scene.spheres, [(sphere.centre, sphere.radius) for sphere in scene.spheres])
+def distinct_spheres(scene: Scene) -> dict[str, Sphere]:
+    """The spheres that `merge_coincident` keeps, by name: `sphere 2` is the file's second."""
+    return _first_of_each("sphere", scene.spheres, [(sphere.centre, sphere.radius) for sphere in scene.spheres])
 
 
-def distinct_planes(scene: Scene) -> dict[int, Plane]:
-    """The planes that `merge_coincident` keeps, by their number in the file, from 1."""
-    return _first_of_each(scene.planes, [_plane_identity(plane) for plane in scene.planes])
+def distinct_planes(scene: Scene) -> dict[str, Plane]:
+    """The planes that `merge_coincident` keeps, by name: `plane 2` is the file's second."""
+    return _first_of_each("plane", scene.planes, [_plane_identity(plane) for plane in scene.planes])
 
 
-def _first_of_each(surfaces: tuple[Surface, ...], identities: list[tuple[object, ...]]) -> dict[int, Surface]:
+def _first_of_each(
+    kind: str, surfaces: tuple[Surface, ...], identities: list[tuple[object, ...]]
+) -> dict[str, Surface]:
     first: dict[tuple[object, ...], int] = {}
-    for number, identity in enumerate(identities, 1):
-        first.setdefault(identity, number)
-    return {number: surfaces[number - 1] for number in first.values()}
+    for place, identity in enumerate(identities):
+        first.setdefault(identity, place)
+    return {f"{kind} {place + 1}": surfaces[place] for place in first.values()}
 
 
 def holds_light(sphere: Sphere) -> bool:

@@ -82,8 +82,9 @@ class World:
         self.Vector, self.Packet = types.Vector3, types.Vector4
         surfaces: list[Sphere | Plane] = [*scene.spheres, *scene.planes]
         self.spheres, self.surfaces = len(scene.spheres), len(surfaces)
-        self.light_on_sphere = any(map(holds_light, scene.spheres))
-        geometry: list[State] = [(*s.centre, s.radius, holds_light(s), 0, 0, 0) for s in scene.spheres]
+        lit = [holds_light(sphere) for sphere in scene.spheres]
+        self.light_on_sphere = any(lit)
+        geometry: list[State] = [(*s.centre, s.radius, on, 0, 0, 0) for s, on in zip(scene.spheres, lit, strict=True)]
         geometry += [(*p.point, 0, *p.unit_normal, p.distance_from(LIGHT)) for p in scene.planes]
         materials: list[State] = [(*s.colour, s.diffuse, s.reflection, 0, 0, 0) for s in surfaces]
         self.geometry, self.materials = self._table(geometry), self._table(materials)

@@ -47,7 +47,7 @@ def _finding(picture: dict[str, Any]) -> tuple[str | None, str]:
     if picture["status"] in ("unsupported", "not-installed"):
         return "skipped", picture["reason"]
     if "verdict" in picture and picture["verdict"] is None:
-        return "skipped", "not compared: the reference is missing"
+        return "skipped", picture["reason"]
     if picture.get("verdict") == "disagree":
         pixels = picture["pixels"]
         return "failure", f"{pixels['unexplained']} of {pixels['total']} pixels differ and are not explained"

@@ -48,6 +48,8 @@ def _compare(folder: Path, truth: NDArray[Any] | None, picture: dict[str, Any]) 
         "worst": [],
         "difference": None,
     }
+    if truth is None and picture["image"]:
+        return {**result, "reason": "not compared: the reference is missing"}
     if truth is None or picture["image"] is None:
         return result
     levels = read_image(folder / f"{picture['image']}.exr")

@@ -73,26 +73,27 @@ def export(scene: Scene, settings: Settings) -> Export:
         light=_vector(LIGHT),
     )
     parts = [header]
-    parts += [_sphere(f"sphere {place}", sphere) for place, sphere in spheres.items()]
-    parts += [_plane(f"plane {place}", plane) for place, plane in planes.items()]
+    parts += [_sphere(name, sphere) for name, sphere in spheres.items()]
+    parts += [_plane(name, plane) for name, plane in planes.items()]
     notes = ("The picture is a 16 bit PNG with linear values; viewers that honour its gamma show it brighter.",)
     return Export({"scene.pov": "\n".join(parts)}, command, "scene.png", notes)
 
 
-def _refuse(spheres: dict[int, Sphere], planes: dict[int, Plane], settings: Settings) -> None:
+def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:
     if settings.depth > DEEPEST:
         raise Unsupported(f"POV-Ray follows at most {DEEPEST} bounces, not {settings.depth}")
-    for name, surface in _named(spheres, planes):
+    surfaces: dict[str, Sphere | Plane] = {**spheres, **planes}
+    for name, surface in surfaces.items():
         if surface.diffuse < 0 or surface.reflection < 0:
             raise Unsupported(f"POV-Ray ignores negative coefficients: {name} has one")
-    for place, sphere in spheres.items():
+    for name, sphere in spheres.items():
         if max(map(abs, sphere.centre)) + sphere.radius > FARTHEST:
-            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: sphere {place} reaches farther")
+            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}: {name} reaches farther")
         if abs(math.dist(sphere.centre, LIGHT) - sphere.radius) < LIGHT_GAP:
-            raise Unsupported(f"POV-Ray decides by rounding whether sphere {place} hides the light, which lies on it")
-    for place, plane in planes.items():
+            raise Unsupported(f"POV-Ray decides by rounding whether {name} hides the light, which lies on it")
+    for name, plane in planes.items():
         if abs(plane.distance_from(EYE)) > FARTHEST_PLANE:
-            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}, where rays along plane {place} would meet it")
+            raise Unsupported(f"POV-Ray sees nothing beyond {FARTHEST:g}, where rays along {name} would meet it")
 
 
 def _sphere(name: str, sphere: Sphere) -> str:
@@ -129,11 +130,6 @@ def _texture(surface: Sphere | Plane) -> str:
 
 def _finish(diffuse: str, surface: Sphere | Plane) -> str:
     return f"finish {{ ambient 1 diffuse {diffuse} specular 0 phong 0 reflection {{ {single(surface.reflection)} }} }}"
-
-
-def _named(spheres: dict[int, Sphere], planes: dict[int, Plane]) -> list[tuple[str, Sphere | Plane]]:
-    named: list[tuple[str, Sphere | Plane]] = [(f"sphere {place}", sphere) for place, sphere in spheres.items()]
-    return named + [(f"plane {place}", plane) for place, plane in planes.items()]
 
 
 def _vector(values: Triple | tuple[float, ...]) -> str:

@@ -96,8 +96,7 @@ SURFACE = """
 
 def export(scene: Scene, settings: Settings) -> Export:
     """A scene file in XML and the Python program with the integrator, which draws it."""
-    spheres = {f"sphere {place}": sphere for place, sphere in distinct_spheres(scene).items()}
-    planes = {f"plane {place}": plane for place, plane in distinct_planes(scene).items()}
+    spheres, planes = distinct_spheres(scene), distinct_planes(scene)
     _refuse(spheres, planes, settings)
     command = (PYTHON, "whitted.py", "scene.xml", "scene.exr")
     header = HEADER.format(
