@@ -21,6 +21,7 @@ from reference.scene import EYE, LARGEST_DEPTH, LARGEST_SIDE, LIGHT, Plane, Scen
 
 UNROLLED = 16  # surfaces; beyond this, compile time outweighs what straight code gains
 BAND = 1 << 22  # pixels a kernel launch, which bounds the memory of large pictures
+MATERIAL = 8  # numbers in a row of materials
 NOTHING = 0xFFFFFFFF  # the index of no surface
 LARGEST_NUMBER = {"double": 1e100, "single": 1e12}  # of a coordinate: products of several must stay finite
 
@@ -43,10 +44,7 @@ def render(
     `depth` counts the bounces after the primary hit; `precision` is that of the computation (double or single).
     Raises InputError for a size or depth out of range and DeviceError where Dr.Jit cannot compute.
     """
-    if not (0 < width <= LARGEST_SIDE and 0 < height <= LARGEST_SIDE):
-        raise InputError(f"expected a size of 1 to {LARGEST_SIDE} pixels a side, found {width}x{height}")
-    if not 0 <= depth <= LARGEST_DEPTH:
-        raise InputError(f"expected a depth of 0 to {LARGEST_DEPTH}, found {depth}")
+    check_request(width, height, depth)
     types = array_types(precision, device)
     _check_magnitudes(scene, precision)
     world = World(scene, model, types)
@@ -55,12 +53,20 @@ def render(
     rows = max(1, BAND // width)
     for top in range(0, height, rows):
         band = picture[top : top + rows]
-        direction = _camera_directions(world, width, height, top, len(band))
+        direction = world.Vector(*model.camera_direction(*pixel_places(world, width, height, top, len(band))))
         colour = dr.ravel(_radiance(world, direction, limit)).numpy()
         band[:] = np.broadcast_to(colour.reshape(-1, 3), (len(band) * width, 3)).reshape(
             band.shape
         )  # constant if empty
     return picture
+
+
+def check_request(width: int, height: int, depth: int) -> None:
+    """Raise InputError for a size or depth out of range."""
+    if not (0 < width <= LARGEST_SIDE and 0 < height <= LARGEST_SIDE):
+        raise InputError(f"expected a size of 1 to {LARGEST_SIDE} pixels a side, found {width}x{height}")
+    if not 0 <= depth <= LARGEST_DEPTH:
+        raise InputError(f"expected a depth of 0 to {LARGEST_DEPTH}, found {depth}")
 
 
 def _check_magnitudes(scene: Scene, precision: str) -> None:
@@ -72,41 +78,38 @@ def _check_magnitudes(scene: Scene, precision: str) -> None:
         raise InputError(f"expected coordinates up to {largest:g} in {precision} precision, found {found:g}")
 
 
-class World:
-    """A scene on the device and the model that reads it."""
+class Rows:
+    """Numbers of each surface on the device, spheres before planes: `width` in `geometry`, 8 in `materials`."""
 
-    def __init__(self, scene: Scene, model: Model, types: Types) -> None:
-        scene = model.surfaces(scene)
-        self.model = model
+    def __init__(self, types: Types, spheres: int, geometry: list[State], materials: list[State], width: int) -> None:
         self.Float, self.Index, self.Mask = types.Float, types.Index, types.Mask
         self.Vector, self.Packet = types.Vector3, types.Vector4
-        surfaces: list[Sphere | Plane] = [*scene.spheres, *scene.planes]
-        self.spheres, self.surfaces = len(scene.spheres), len(surfaces)
-        lit = [holds_light(sphere) for sphere in scene.spheres]
-        self.light_on_sphere = any(lit)
-        geometry: list[State] = [(*s.centre, s.radius, on, 0, 0, 0) for s, on in zip(scene.spheres, lit, strict=True)]
-        geometry += [(*p.point, 0, *p.unit_normal, p.distance_from(LIGHT)) for p in scene.planes]
-        materials: list[State] = [(*s.colour, s.diffuse, s.reflection, 0, 0, 0) for s in surfaces]
-        self.geometry, self.materials = self._table(geometry), self._table(materials)
+        self.spheres, self.surfaces, self.width = spheres, len(geometry), width
+        self.geometry, self.materials = self._table(geometry, width), self._table(materials, MATERIAL)
         self.uniform = [[self._uniform(value) for value in row] for row in geometry[: UNROLLED + 1]]
-        self.ambient = self.Vector(*map(self._uniform, scene.ambient))
-        self.ambient_coefficient = self._uniform(scene.ambient_coefficient)
-        self.light = self.Vector(*LIGHT)
-        self.first_plane = dr.opaque(self.Index, self.spheres)
+        self.first_plane = dr.opaque(self.Index, spheres)
 
     def _uniform(self, value: float) -> Number:
         """A number that is an input of the kernel, not a part of its code."""
         return dr.opaque(self.Float, value)
 
-    def _table(self, rows: list[State]) -> Number:
+    def _table(self, rows: list[State], width: int) -> Number:
         """All rows in one array; one of zeros where there is none, so that there is something to gather."""
         # Dr.Jit borrows NumPy arrays where they lie, and the kernel would depend on how they are aligned.
-        return self.Float(list(chain.from_iterable(rows or [(0.0,) * 8])))
+        return self.Float(list(chain.from_iterable(rows or [(0.0,) * width])))
 
-    def row(self, table: Number, index: Number, active: Mask = True) -> list[Number]:
-        """The eight numbers of a surface in `geometry` or `materials`, fetched in two packets."""
-        packets = (dr.gather(self.Packet, table, 2 * index + half, active) for half in (0, 1))
-        return [number for packet in packets for number in packet]
+    def row(self, index: Number, active: Mask = True) -> list[Number]:
+        """The geometry of a surface."""
+        return self._gather(self.geometry, self.width // 4, index, active)
+
+    def material(self, index: Number, active: Mask = True) -> list[Number]:
+        """The material of a surface."""
+        return self._gather(self.materials, MATERIAL // 4, index, active)
+
+    def _gather(self, table: Number, packets: int, index: Number, active: Mask) -> list[Number]:
+        """A row, fetched in packets of four."""
+        parts = (dr.gather(self.Packet, table, packets * index + part, active) for part in range(packets))
+        return [number for packet in parts for number in packet]
 
     def fold(
         self, first: int, last: int, step: Callable[..., State], state: State, going: Callable[..., Mask]
@@ -118,20 +121,43 @@ class World:
             return state
 
         def body(index: Number, *state: Number) -> State:
-            return (index + 1, *step(index, self.row(self.geometry, index), *state))
+            return (index + 1, *step(index, self.row(index), *state))
 
         start, end = dr.opaque(self.Index, first), dr.opaque(self.Index, last)
         _, *folded = dr.while_loop((start, *state), lambda index, *state: (index < end) & going(*state), body)
         return tuple(folded)
 
 
-def _camera_directions(world: World, width: int, height: int, top: int, rows: int) -> Vector:
-    pixel = dr.arange(world.Index, rows * width)
-    across, down = dr.opaque(world.Index, width), dr.opaque(world.Index, height)
+class World(Rows):
+    """A scene on the device and the model that reads it."""
+
+    def __init__(self, scene: Scene, model: Model, types: Types) -> None:
+        scene = model.surfaces(scene)
+        self.model = model
+        lit = [holds_light(sphere) for sphere in scene.spheres]
+        self.light_on_sphere = any(lit)
+        geometry: list[State] = [(*s.centre, s.radius, on, 0, 0, 0) for s, on in zip(scene.spheres, lit, strict=True)]
+        geometry += [(*p.point, 0, *p.unit_normal, p.distance_from(LIGHT)) for p in scene.planes]
+        super().__init__(types, len(scene.spheres), geometry, materials(scene), width=8)
+        self.ambient = self.Vector(*map(self._uniform, scene.ambient))
+        self.ambient_coefficient = self._uniform(scene.ambient_coefficient)
+        self.light = self.Vector(*LIGHT)
+
+
+def materials(scene: Scene) -> list[State]:
+    """Colour, diffuse and reflection coefficient of each surface."""
+    surfaces: tuple[Sphere | Plane, ...] = (*scene.spheres, *scene.planes)
+    return [(*s.colour, s.diffuse, s.reflection, 0, 0, 0) for s in surfaces]
+
+
+def pixel_places(rows: Rows, width: int, height: int, top: int, count: int) -> tuple[Number, ...]:
+    """Column and row of each pixel in `count` rows from `top` on, and the picture's width and height."""
+    pixel = dr.arange(rows.Index, count * width)
+    across, down = dr.opaque(rows.Index, width), dr.opaque(rows.Index, height)
     row = pixel // across
     column = pixel - row * across
-    row += dr.opaque(world.Index, top)
-    return world.Vector(*world.model.camera_direction(*map(world.Float, (column, row, across, down))))
+    row += dr.opaque(rows.Index, top)
+    return tuple(map(rows.Float, (column, row, across, down)))
 
 
 @dr.syntax
@@ -143,8 +169,8 @@ def _radiance(world: World, direction: Vector, limit: Number) -> Vector:
     origin = world.Vector(*EYE)
     t, hit = nearest(world, world.model.camera, origin, direction, world.Index(NOTHING), world.Mask(True))
     while hit != NOTHING:
-        x, y, z, radius, normal_x, normal_y, normal_z, _ = world.row(world.geometry, hit)
-        red, green, blue, diffuse, mirror, _, _, _ = world.row(world.materials, hit)
+        x, y, z, radius, normal_x, normal_y, normal_z, _ = world.row(hit)
+        red, green, blue, diffuse, mirror, _, _, _ = world.material(hit)
         point = dr.fma(direction, t, origin)
         sphere_normal = world.model.sphere_normal(point, world.Vector(x, y, z), radius)
         normal = dr.select(hit < world.first_plane, sphere_normal, world.Vector(normal_x, normal_y, normal_z))
