@@ -9,7 +9,7 @@ HAS_ATOMIC := $(PYTHON) -c 'import ctypes; ctypes.CDLL("libatomic.so.1")'
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help report test lint bench pictures lock renderers browser clean
+.PHONY: help report test lint bench soundness docs pictures lock renderers browser clean
 
 help:  ## Say what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -28,8 +28,14 @@ lint: $(READY)
 bench: $(READY) renderers  ## Time the tracer beside POV-Ray and print the ratios
 	$(BIN)/python tests/benchmarks/peers.py
 
+soundness: $(READY)  ## Prove certified pixels a second time, every one, with Arb (minutes)
+	$(BIN)/python tests/benchmarks/soundness.py
+
 pictures: report browser  ## Draw the pictures of the README
 	$(BIN)/python docs/pictures.py
+
+docs: $(READY)  ## Write the generated pages of docs/
+	$(BIN)/python docs/scenes.py
 
 lock: $(READY)  ## Pin the newest versions of all dependencies, with hashes
 	$(BIN)/pip-compile --quiet --upgrade --generate-hashes --allow-unsafe --strip-extras --extra dev --no-header \

@@ -219,7 +219,7 @@ def check(
     quiet: QuietOption = False,
     verbose: VerboseOption = False,
 ) -> None:
-    """Draw scenes in every renderer, compare the pictures with the exact one, and write a report.
+    """Draw scenes in every renderer, compare the pictures with the certified truth, and write a report.
 
     \b
     crossray check
@@ -229,11 +229,11 @@ def check(
     from reports.recording import Recording
     from reports.terminal import progress_bar, summary_lines
     from reports.writing import write_reports
-    from translator.registry import NATIVE, adapter, renderer_names
+    from translator.registry import TRUTH, adapter, renderer_names
     from translator.run import run_renderer
 
     required = _split(renderers)
-    names = [name for name in required or renderer_names() if name != NATIVE]
+    names = required or renderer_names()
     for name in names:
         adapter(name)
     loaded = [(path, _load(path, quiet)) for path in scenes or _examples()]
@@ -242,7 +242,7 @@ def check(
     with progress_bar(quiet, verbose, len(loaded) * (2 * len(names) + 1)) as advance:
         for path, scene in loaded:
             entry = run.add_scene(path, size.width, size.height, depth=depth, convention="exact", text=dump(scene))
-            for name in (NATIVE, *names):
+            for name in (TRUTH, *names):
                 advance(f"{entry['scene']}: {name}")
                 outcome = run_renderer(name, scene, settings, timeout)
                 facts = {key: value for key, value in vars(outcome).items() if key != "picture"}
@@ -324,6 +324,49 @@ def explain(
     _print("\n\n".join("\n".join(ray_tree(explanation)) for explanation in told))
     for other in told[1:]:
         _print(f"\n{parting(told[0], other)}")
+
+
+@app.command()
+def certify(
+    scene: SceneArgument,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The certified picture: EXR, PNG.")] = None,
+    mask: Annotated[
+        Path | None, typer.Option("--mask", help="A PNG: white is proven, grey a knife edge, black undecided.")
+    ] = None,
+    size: SizeOption = SQUARE,
+    depth: DepthOption = 3,
+    as_json: Annotated[bool, typer.Option("--json", help="The same for programs.")] = False,
+    quiet: QuietOption = False,
+    verbose: VerboseOption = False,
+) -> None:
+    """Prove every pixel of the exact picture, and list those that no precision can decide.
+
+    \b
+    crossray certify scenes/example1.txt
+    crossray certify homework.txt -o truth.exr --mask mask.png
+    """
+    from reference.certification import certify
+    from reference.image import check_format, write_image
+    from reports.certificate import as_data, as_text
+    from reports.terminal import progress_bar
+
+    for path in filter(None, (output, mask)):
+        check_format(path)
+    loaded = _load(scene, quiet)
+    start = perf_counter()
+    with progress_bar(quiet, verbose, 100) as advance:
+        certificate = certify(loaded, width=size.width, height=size.height, depth=depth, progress=advance)
+    _say(f"certified in {perf_counter() - start:.3f} s", quiet)
+    if output:
+        write_image(output, certificate.picture)
+    if mask:
+        write_image(mask, certificate.mask[..., None].repeat(3, axis=-1).astype(float))
+    if as_json:
+        import json
+
+        _print(json.dumps({"version": 1, "scene": scene, **as_data(certificate)}, indent=1, allow_nan=False))
+    else:
+        _print("\n".join(as_text(certificate)))
 
 
 @app.command()

@@ -13,17 +13,19 @@ from reference.scene import Scene
 from reference.sweep import sweep
 from reference.tracer import check_request
 
-UNDECIDED, KNIFE_EDGE, CERTAIN = 0, 128, 255  # in the mask
+UNDECIDED, KNIFE_EDGE, CERTAIN = 0, 128, 255
+WORK = 20_000_000  # pixels times surfaces that are proven one by one; what is left then stays undecided
+STEPS = 100  # of the progress
 
 
 @dataclass(frozen=True)
 class Certificate:
     """What is known of a picture by the `exact` convention.
 
-    `picture`: height x width x 3, levels, not clamped, each channel within 1e-6 level of the truth (over 255: 1e-6 of
-    255ths); at an exact tie the colour that the model's rule for ties gives. `mask`: height x width, CERTAIN where
-    only that colour is right, KNIFE_EDGE where `edges` lists all that are, UNDECIDED where not all could be found.
-    `edges`: what is admissible at (column, row) of every pixel that is not certain.
+    `picture`: height x width x 3, levels, not clamped; where proven, each channel is within 1e-6 level of the truth
+    (over 255 levels: 1e-6 of 255ths of it). `mask`: height x width, 255 where that is proven; 128 for a knife edge,
+    where the picture has the colour by the model's rule for ties and `edges` lists every admissible one at
+    (column, row); 0 where not all could be found, and the picture's is one of those in `edges`, if any, or a guess.
     """
 
     picture: NDArray[np.float64]
@@ -31,7 +33,7 @@ class Certificate:
     edges: dict[tuple[int, int], Admissible]
 
     def count(self, kind: int) -> int:
-        """How many pixels are of that kind in the mask."""
+        """How many pixels of the mask are of that kind."""
         return int((self.mask == kind).sum())
 
 
@@ -41,11 +43,11 @@ def certify(
     width: int = 1000,
     height: int = 1000,
     depth: int = 3,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> Certificate:
     """Prove every pixel: all at once in double precision, what that leaves open one by one at rising precision.
 
-    `progress` is told how many of those are done, and of how many. Raises InputError for a size or depth out of range
+    `progress` is told in at most a hundred steps how far that is. Raises InputError for a size or depth out of range
     and DeviceError where Dr.Jit cannot compute.
     """
     check_request(width, height, depth)
@@ -55,10 +57,13 @@ def certify(
     prover = Prover(scene, width=width, height=height, depth=depth)
     edges = {}
     left = np.argwhere(~proven)
-    for done, (row, column) in enumerate(left.tolist()):
-        progress(done, len(left))
+    step = -(-len(left) // STEPS) or 1
+    for done, (row, column) in enumerate(left[: WORK // max(1, prover.surfaces)].tolist()):
+        if done % step == 0:
+            progress(f"proving pixel {done} of {len(left)}")
         found = prover.admissible(column, row)
-        picture[row, column] = found.colours[0].value if found.colours else np.nan
+        if found.colours:
+            picture[row, column] = found.colours[0].value
         if found.proven:
             mask[row, column] = CERTAIN
         else:

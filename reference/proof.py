@@ -52,6 +52,7 @@ class Prover:
     def __init__(self, scene: Scene, *, width: int = 1000, height: int = 1000, depth: int = 3) -> None:
         self.scene = merge_coincident(scene)
         self.width, self.height, self.depth = width, height, depth
+        self.surfaces = len(self.scene.spheres) + len(self.scene.planes)
         self._tables: dict[int, Tables] = {}
 
     def admissible(self, column: int, row: int, rules: Rules = EXACT_RULES) -> Admissible:

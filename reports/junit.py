@@ -35,6 +35,10 @@ def _add_case(suite: ElementTree.Element, scene: str, picture: dict[str, Any]) -
         name=_clean(picture["renderer"]),
         time=f"{picture['seconds'] or 0:.3f}",
     )
+    if explained := (picture.get("pixels") or {}).get("explained"):
+        properties = ElementTree.SubElement(case, "properties")
+        for name, number in explained.items():
+            ElementTree.SubElement(properties, "property", name=name, value=str(number))
     kind, message = _finding(picture)
     if kind:
         ElementTree.SubElement(case, kind, message=_clean(message)).text = _clean(picture["log"])

@@ -10,6 +10,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from reports.accounting import CLASSES
 from reports.metrics import SETTINGS, THRESHOLDS, TOLERANCE
 from reports.results import AMPLIFIED
 
@@ -34,6 +35,7 @@ def page(folder: Path, results: dict[str, Any]) -> str:
         settings=SETTINGS,
         thresholds=[f"{level:g}" for level in THRESHOLDS],
         tolerance=TOLERANCE,
+        classes=CLASSES,
         amplified=AMPLIFIED,
         style=_asset("report.css"),
         script=_asset("report.js"),
@@ -53,8 +55,12 @@ def _summary(results: dict[str, Any]) -> str:
     """One sentence on the whole run."""
     compared = [picture for scene in results["scenes"] for picture in scene["comparisons"] if picture["pixels"]]
     agreeing = sum(picture["verdict"] == "agree" for picture in compared)
-    differing, total = (sum(picture["pixels"][key] for picture in compared) for key in ("unexplained", "total"))
-    return f"{agreeing} of {len(compared)} comparisons agree; {differing:,} of {total:,} pixels differ."
+    open_, total = (sum(picture["pixels"][key] for picture in compared) for key in ("unexplained", "total"))
+    explained = sum(sum(picture["pixels"]["explained"].values()) for picture in compared)
+    return (
+        f"{agreeing} of {len(compared)} comparisons agree; of {total:,} pixels "
+        f"{explained:,} differ for a reason that is proven, {open_:,} for none."
+    )
 
 
 def _marks(scene: dict[str, Any]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,7 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.errors import SceneError, SceneWarning
 from reference.image import read_image, write_image
+from reference.proof import Prover
+from reference.text import parse
+from reports.accounting import CLASSES, Reason, account
 from reports.metrics import TOLERANCE, Measurement, error_map, measure
 from reports.recording import read_run
 
@@ -29,16 +35,32 @@ def judge(folder: Path, progress: Callable[[str], None] = lambda text: None) -> 
 def _judge_scene(folder: Path, entry: dict[str, Any], progress: Callable[[str], None]) -> dict[str, Any]:
     reference, *others = entry["pictures"]
     truth = read_image(folder / f"{reference['image']}.exr") if reference["image"] else None
+    prover = _prover(entry)
     comparisons = []
     for picture in others:
         progress(f"{entry['scene']}: comparing {picture['renderer']}")
-        comparisons.append(_compare(folder, truth, picture))
+        comparisons.append(_compare(folder, truth, picture, prover))
     scene = {key: value for key, value in entry.items() if key != "pictures"}
     seconds = reference["seconds"] if reference["trace_seconds"] is None else reference["trace_seconds"]
     return {**scene, "seconds": seconds, "reference": reference, "comparisons": comparisons}
 
 
-def _compare(folder: Path, truth: NDArray[Any] | None, picture: dict[str, Any]) -> dict[str, Any]:
+def _prover(entry: dict[str, Any]) -> Prover | None:
+    """What can explain differences, where the scene is known."""
+    if entry["text"] is None:
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)
+            scene = parse(entry["text"])
+    except SceneError:
+        return None
+    return Prover(scene, width=entry["width"], height=entry["height"], depth=entry["depth"])
+
+
+def _compare(
+    folder: Path, truth: NDArray[Any] | None, picture: dict[str, Any], prover: Prover | None
+) -> dict[str, Any]:
     result = {
         **picture,
         "verdict": None,
@@ -58,7 +80,12 @@ def _compare(folder: Path, truth: NDArray[Any] | None, picture: dict[str, Any]) 
     difference = f"{picture['image']}-difference"
     shown = np.nan_to_num(np.abs(np.clip(truth, 0, 255) - np.clip(levels, 0, 255)), nan=255)
     write_image(folder / f"{difference}.png", shown * AMPLIFIED)
-    pixels = _account(measured)
+    places = _differing(error)
+    limits = picture.get("limits") or {}
+    reasons: list[Reason | None] = [None] * len(places)
+    if prover:
+        reasons = account(prover, limits, levels, places)
+    pixels = _count(measured, reasons)
     return {
         **result,
         "verdict": "disagree" if pixels["unexplained"] else "agree",
@@ -66,22 +93,36 @@ def _compare(folder: Path, truth: NDArray[Any] | None, picture: dict[str, Any]) 
         "places": {"ssim_min": measured.ssim_min_at, "max_error": measured.max_error_at},
         "pixels": pixels,
         "over": measured.over,
-        "worst": _worst(error),
+        "worst": _worst(error, places, reasons),
         "difference": difference,
     }
 
 
-def _account(measured: Measurement) -> dict[str, Any]:
-    """Every pixel in one class; no difference is explained yet."""
-    wrong = measured.over[f"{TOLERANCE:g}"]
-    return {"total": measured.total, "agree": measured.total - wrong, "explained": {}, "unexplained": wrong}
+def _differing(error: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Row and column of the pixels that do not agree, largest error first; of equal ones the topmost, then leftmost."""
+    rows, columns = np.nonzero(~(error <= TOLERANCE))
+    order = np.lexsort((columns, rows, -error[rows, columns]))
+    return np.stack([rows[order], columns[order]], axis=-1)
 
 
-def _worst(error: NDArray[np.float64]) -> list[dict[str, Any]]:
-    """The pixels that do not agree, largest error first; of equal ones the topmost, then leftmost."""
-    rows, columns = np.nonzero(error > TOLERANCE)
-    order = np.lexsort((columns, rows, -error[rows, columns]))[:WORST]
+def _count(measured: Measurement, reasons: list[Reason | None]) -> dict[str, Any]:
+    """Every pixel in one class."""
+    kinds = Counter(reason.kind for reason in reasons if reason)
+    explained = {kind: kinds[kind] for kind in CLASSES if kinds[kind]}
+    agree = measured.total - len(reasons)
+    return {"total": measured.total, "agree": agree, "explained": explained, "unexplained": reasons.count(None)}
+
+
+def _worst(error: NDArray[np.float64], places: NDArray[np.intp], reasons: list[Reason | None]) -> list[dict[str, Any]]:
+    """The pixels that do not agree, those without a reason first."""
+    order = sorted(range(len(reasons)), key=lambda i: reasons[i] is not None)[:WORST]
     return [
-        {"column": int(columns[i]), "row": int(rows[i]), "error": round(float(error[rows[i], columns[i]]), 3)}
+        {
+            "column": int(places[i][1]),
+            "row": int(places[i][0]),
+            "error": round(float(error[tuple(places[i])]), 3),
+            "class": reason.kind if (reason := reasons[i]) else None,
+            "evidence": reason.evidence if reason else None,
+        }
         for i in order
     ]

@@ -23,8 +23,10 @@ def summary_lines(results: dict[str, Any]) -> Iterator[str]:
 def _finding(picture: dict[str, Any]) -> str:
     if not picture["pixels"]:
         return str(picture["reason"])
-    wrong, total = picture["pixels"]["unexplained"], picture["pixels"]["total"]
-    return f"{wrong} of {total} pixels differ, by at most {picture['metrics']['max_error']:.3g} levels"
+    pixels = picture["pixels"]
+    explained = "".join(f", {number} {kind}" for kind, number in pixels["explained"].items())
+    largest = f"largest error {picture['metrics']['max_error']:.3g} levels"
+    return f"{pixels['unexplained']} of {pixels['total']} pixels unexplained{explained}; {largest}"
 
 
 @contextmanager

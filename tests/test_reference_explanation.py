@@ -16,15 +16,13 @@ from reference.text import parse
 from reference.tracer import render
 from reports.raytree import parting, ray_tree
 
-SCENES = sorted((ROOT / "scenes").glob("*.txt")) + sorted((ROOT / "scenes" / "semantic").glob("*.txt"))
-# Exact ties and a light exactly on a surface: there, rounding decides.
-DECIDED = [path for path in SCENES if path.stem not in ("coincident", "corner_tie", "light_on_sphere", "dust")]
+SCENES = sorted((ROOT / "scenes").glob("*.txt")) + sorted((ROOT / "scenes" / "diagnostic").glob("*.txt"))
 
 pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
-@pytest.mark.parametrize("path", DECIDED, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_the_terms_sum_to_the_pixel(path: Path, convention: str) -> None:
     scene, model = Scene.load(path), CONVENTIONS[convention]
     picture = render(scene, model, width=200, height=100, dtype=float)
@@ -60,7 +58,7 @@ def test_numbers_are_those_of_the_file_where_twins_are_merged() -> None:
 
 
 def test_depth_and_misses_end_the_tree() -> None:
-    mirrors = Scene.load(ROOT / "scenes" / "semantic" / "parallel_mirrors.txt")
+    mirrors = Scene.load(ROOT / "scenes" / "diagnostic" / "facing_mirrors.txt")
     assert len(explain(mirrors, column=10, row=10, depth=7).bounces) == 8
     nothing = explain(parse("0 0 0\n0\n0\n0\n"), column=0, row=0)
     assert (len(nothing.bounces), nothing.bounces[0].hit, nothing.bytes) == (1, None, (0, 0, 0))

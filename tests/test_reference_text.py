@@ -144,7 +144,7 @@ def test_a_warning_counts_blank_lines_and_all_line_ends() -> None:
         parse("\ufeff\r\r\n0 0 0\n\r  2\r0\r\n0".encode())
 
 
-@pytest.mark.parametrize("name", ["example1", "example2", "example3", "example4", "semantic/near_cross"])
+@pytest.mark.parametrize("name", ["example1", "example2", "example3", "example4", "diagnostic/near_cross"])
 def test_ordinary_scenes_do_not_warn(name: str) -> None:
     load(SCENES / f"{name}.txt")
 

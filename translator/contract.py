@@ -35,6 +35,18 @@ class Settings:
 
 
 @dataclass(frozen=True)
+class Limits:
+    """What the renderer's arithmetic cannot do better, in the assignment's units, for this scene.
+
+    `precision`: the relative error that its points and directions may have. `gap`: how far from its start a shadow or
+    mirrored ray may miss things, where the renderer starts its rays a little ahead.
+    """
+
+    precision: float = 0.0
+    gap: float = 0.0
+
+
+@dataclass(frozen=True)
 class Export:
     """A scene in a renderer's own language.
 
@@ -47,6 +59,7 @@ class Export:
     image: str
     notes: tuple[str, ...] = ()
     environment: Mapping[str, str] = field(default_factory=dict)
+    limits: Limits = Limits()
 
 
 class Unsupported(CrossrayError):

@@ -13,8 +13,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import IO, Any
@@ -51,6 +52,7 @@ class Outcome:
     command: str = ""
     log: str = ""
     notes: tuple[str, ...] = ()
+    limits: Mapping[str, float] = field(default_factory=dict)
 
 
 def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 600) -> Outcome:
@@ -85,7 +87,18 @@ def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 6
     timing = re.search(renderer.TIMING, log)
     trace_seconds = float(timing[1]) if timing else None
     return Outcome(
-        name, renderer.TITLE, RENDERED, version, None, seconds, trace_seconds, picture, command, log, export.notes
+        name,
+        renderer.TITLE,
+        RENDERED,
+        version,
+        None,
+        seconds,
+        trace_seconds,
+        picture,
+        command,
+        log,
+        export.notes,
+        asdict(export.limits),
     )
 
 

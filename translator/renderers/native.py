@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from reference.scene import Scene
 from reference.text import dump
-from translator.contract import PYTHON, Export, Settings
+from translator.contract import PYTHON, Export, Limits, Settings
 
 TITLE = "crossray"
 INSTALL = "pip install crossray"
 VERSION = ((PYTHON, "-m", "crossray", "--version"), r"crossray (\S+)")
 TIMING = r"traced in ([0-9.e-]+) s"
+
+LIMITS = Limits(precision=2.0**-44)
 
 
 def export(scene: Scene, settings: Settings) -> Export:
@@ -17,4 +19,4 @@ def export(scene: Scene, settings: Settings) -> Export:
     size = f"{settings.width}x{settings.height}"
     command = (PYTHON, "-m", "crossray", "render", "scene.txt", "-o", "scene.exr")
     options = ("--size", size, "--depth", str(settings.depth), "--convention", "exact", "--time")
-    return Export({"scene.txt": dump(scene)}, command + options, "scene.exr")
+    return Export({"scene.txt": dump(scene)}, command + options, "scene.exr", limits=LIMITS)

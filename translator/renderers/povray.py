@@ -16,7 +16,7 @@ from reference.scene import (
     distinct_planes,
     distinct_spheres,
 )
-from translator.contract import Export, Settings, Unsupported, number, single
+from translator.contract import Export, Limits, Settings, Unsupported, number, single
 
 TITLE = "POV-Ray"
 INSTALL = "apt-get install povray"
@@ -24,6 +24,7 @@ VERSION = (("povray", "--version"), r"POV-Ray (\d[\w.]*)")
 TIMING = r"Trace Time:.*\(([0-9.]+) seconds\)"
 
 UNIT = 0.1  # POV-Ray's tolerances are absolute (1e-4 for reflections, 1e-3 for shadows) and suit this scale
+LIMITS = Limits(precision=2.0**-20, gap=1e-3 / UNIT)
 DEEPEST = 255  # bounces: max_trace_level stops at 256
 FARTHEST = 1e7 / UNIT  # POV-Ray ignores hits beyond 1e7 of its units
 FARTHEST_PLANE = 1e5  # of a plane: slanting rays meet it much farther away
@@ -76,7 +77,7 @@ def export(scene: Scene, settings: Settings) -> Export:
     parts += [_sphere(name, sphere) for name, sphere in spheres.items()]
     parts += [_plane(name, plane) for name, plane in planes.items()]
     notes = ("The picture is a 16 bit PNG with linear values; viewers that honour its gamma show it brighter.",)
-    return Export({"scene.pov": "\n".join(parts)}, command, "scene.png", notes)
+    return Export({"scene.pov": "\n".join(parts)}, command, "scene.png", notes, limits=LIMITS)
 
 
 def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:

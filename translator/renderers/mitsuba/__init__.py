@@ -19,13 +19,14 @@ from reference.scene import (
     distinct_planes,
     distinct_spheres,
 )
-from translator.contract import PYTHON, Export, Settings, Unsupported, number, single
+from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single
 
 TITLE = "Mitsuba 3"
 INSTALL = "pip install mitsuba"
 VERSION = ((PYTHON, "-c", "import importlib.metadata as m; print('mitsuba', m.version('mitsuba'))"), r"mitsuba (\S+)")
 TIMING = r"traced in ([0-9.e-]+) s"
 
+LIMITS = Limits(precision=2.0**-20, gap=0.1)  # single precision; rays start ahead by 1e-4 of the way to the light
 MIRROR_SHARE = 1 - 2.0**-23  # of the blended BSDF: the rest is the smallest share that float32 keeps apart
 PLANE_RADIUS = 1e9  # a plane is a disk of this radius
 # What single precision carries, found by comparing pictures.
@@ -119,7 +120,7 @@ def export(scene: Scene, settings: Settings) -> Export:
         "Diffuse and mirror are one blended BSDF: a share of 2^-23 for diffuse, whose reflectance is scaled by 2^23.",
         "Ambient light is emission. Planes are disks of radius 1e9.",
     )
-    return Export(files, (*command, "--time"), "scene.exr", notes)
+    return Export(files, (*command, "--time"), "scene.exr", notes, limits=LIMITS)
 
 
 def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:

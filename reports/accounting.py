@@ -1,0 +1,112 @@
+"""Why a pixel differs from the certified truth: one class for each pixel, by proof, or none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference.proof import PROVEN, Colour, Prover
+from reference.scene import Triple
+from reference.walk import DOCUMENT_RULES, Rules
+from reports.metrics import TOLERANCE
+
+KNIFE_EDGE, DOCUMENT_WINDOW = "knife-edge", "document-window"
+PRECISION, LIMIT = "renderer-precision", "declared-limit"
+CLASSES = {
+    KNIFE_EDGE: "No precision can decide the pixel, and this is one of the colours that it may have.",
+    DOCUMENT_WINDOW: "The colour by the document's text, where its smallest distance of 1e-4 parts from the exact model.",
+    PRECISION: "Closer to a branch than the renderer's precision can tell, and the colour on the other side of it.",
+    LIMIT: "The colour without what is closer to the start of a ray than the renderer can see.",
+}
+STEPS = (2.0**-8, 2.0**-4, 1.0)  # of the declared precision: the smallest that explains a pixel is named
+WEAK = 0.5  # levels: a colour that leeway makes wider than this is no evidence
+GIVE_UP = 16_000  # unexplained pixels times surfaces; what is left then is not examined
+
+
+class Reason(NamedTuple):
+    """A class and the evidence for it."""
+
+    kind: str
+    evidence: str
+
+
+def account(
+    prover: Prover, limits: Mapping[str, float], picture: NDArray[Any], places: NDArray[np.intp]
+) -> list[Reason | None]:
+    """A reason for each of `places` (row, column) of a picture in levels, None for those that are unexplained.
+
+    `limits` are what the renderer declared: `precision`, the relative error of its points and directions, and `gap`,
+    the distance from the start of a ray within which it may miss things. After very many unexplained pixels the rest
+    counts as unexplained too.
+    """
+    most = max(50, GIVE_UP // max(1, prover.surfaces))
+    reasons: list[Reason | None] = []
+    unexplained = 0
+    for row, column in places.tolist():
+        red, green, blue = map(float, picture[row, column])
+        reason = explain_pixel(prover, limits, column, row, (red, green, blue)) if unexplained < most else None
+        unexplained += reason is None
+        reasons.append(reason)
+    return reasons
+
+
+def explain_pixel(prover: Prover, limits: Mapping[str, float], column: int, row: int, value: Triple) -> Reason | None:
+    """Which class holds `value`, the colour that a renderer gave a pixel; None for no class."""
+    if not all(map(math.isfinite, value)):
+        return None
+    truth = prover.admissible(column, row)
+    if not truth.proven and any(_holds(colour, value) for colour in truth.colours):
+        number = f"{len(truth.colours)}" if truth.complete else f"at least {len(truth.colours)}"
+        return Reason(KNIFE_EDGE, f"one of {number} admissible colours")
+    if any(_holds(colour, value) for colour in prover.admissible(column, row, DOCUMENT_RULES).colours):
+        return Reason(DOCUMENT_WINDOW, "the colour by the document's text")
+    precision, gap = limits.get("precision", 0.0), limits.get("gap", 0.0)
+    for kind, width in ((PRECISION, 0.0), (LIMIT, gap)):
+        widest = Rules(precision=precision, gap=width)
+        if not widest.has_leeway or not _may_hold(prover, column, row, widest, value):
+            continue
+        for step in (0.0, *STEPS) if width else STEPS:
+            rules = Rules(precision=precision * step, gap=width)
+            if _is_other_side(prover, column, row, rules, value, truth.colours):
+                return Reason(kind, _evidence(rules))
+    return None
+
+
+def _may_hold(prover: Prover, column: int, row: int, rules: Rules, value: Triple) -> bool:
+    """Whether the widest leeway leads anywhere near: it must open a branch, and hold the value."""
+    found = prover.admissible(column, row, rules)
+    return not found.complete or (len(found.colours) > 1 and any(_holds(colour, value) for colour in found.colours))
+
+
+def _is_other_side(
+    prover: Prover, column: int, row: int, rules: Rules, value: Triple, truth: tuple[Colour, ...]
+) -> bool:
+    """Whether the value is a sharp colour of another branch than the truth's."""
+    others = [
+        colour
+        for colour in prover.admissible(column, row, rules).colours
+        if max(colour.radius) <= WEAK and not any(_holds(colour, right.value, PROVEN) for right in truth)
+    ]
+    return any(_holds(colour, value) for colour in others)
+
+
+def _holds(colour: Colour, value: Triple, tolerance: float = TOLERANCE) -> bool:
+    """Whether each channel of the value, clamped, is within the colour's ball, widened by `tolerance` levels."""
+    return all(
+        _clamped(centre - radius) - tolerance <= _clamped(found) <= _clamped(centre + radius) + tolerance
+        for centre, radius, found in zip(colour.value, colour.radius, value, strict=True)
+    )
+
+
+def _clamped(level: float) -> float:
+    return min(255.0, max(0.0, level))
+
+
+def _evidence(rules: Rules) -> str:
+    parts = [f"missing what is nearer than {rules.gap:g} to the start of a ray"] if rules.gap else []
+    parts += [f"an error of 2^{math.log2(rules.precision):g} of the coordinates"] if rules.precision else []
+    return f"the other side of a branch, reached by {' and '.join(parts)}"
