@@ -1,9 +1,13 @@
-"""The ray tree behind one pixel: the model's own steps, applied to plain numbers, with everything that they found."""
+"""The ray tree behind one pixel: the model's own steps, applied to plain numbers, with everything that they found.
+
+For the conventions that can be certified, each ray starts afresh from the proven one: no error grows from bounce to
+bounce, and at an edge the ray goes where the proof says.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,10 +16,13 @@ import numpy as np
 from reference.device import load_drjit
 from reference.errors import InputError
 from reference.image import quantise
-from reference.model import DOCUMENT, Model, Window
+from reference.model import DOCUMENT, EXACT, Model, Window
+from reference.proof import Prover
 from reference.scene import EYE, LIGHT, Plane, Scene, Sphere, Triple, holds_light
+from reference.walk import DOCUMENT_RULES, EXACT_RULES, Point, Ray, Rules
 
 Surface = Sphere | Plane
+LARGEST_PROOF = 5000  # surfaces, so that an answer takes less than a second
 
 
 @dataclass(frozen=True)
@@ -46,14 +53,30 @@ class Bounce:
     ambient: Triple | None = None
     cosine: float | None = None  # max(0, n.l)
     to_light: Triple | None = None
+    lit: bool = False  # whether there is a diffuse term
     blockers: tuple[Crossing, ...] = ()
     diffuse: Triple | None = None
     contribution: Triple | None = None  # weight * (ambient + diffuse)
 
 
 @dataclass(frozen=True)
+class Certified:
+    """What is proven of a pixel: its colour, or the admissible ones if it is a knife edge (all, if `complete`).
+
+    Levels, not clamped; the first is that of the model's rule for ties.
+    """
+
+    proven: bool
+    complete: bool
+    colours: tuple[Triple, ...]
+
+
+@dataclass(frozen=True)
 class Explanation:
-    """A pixel's rays, first to last, and what they add up to."""
+    """A pixel's rays, first to last, and what they add up to.
+
+    `certified` is None for a model that cannot be certified, and for scenes of more than 5000 surfaces.
+    """
 
     convention: str
     column: int
@@ -61,6 +84,7 @@ class Explanation:
     bounces: tuple[Bounce, ...]
     colour: Triple  # levels, not clamped
     bytes: tuple[int, int, int]  # clamped and truncated
+    certified: Certified | None
 
 
 def explain(
@@ -83,14 +107,26 @@ def explain(
     from drjit.scalar import Array3f64 as Vector
 
     tracer = _Tracer(scene, model, Vector)
+    proof = None
+    if (rules := _rules(model)) and len(tracer.surfaces) <= LARGEST_PROOF:
+        proof = Prover(scene, width=width, height=height, depth=depth).admissible(column, row, rules)
     camera = Vector(*model.camera_direction(float(column), float(row), float(width), float(height)))
-    bounces = tuple(tracer.follow(Vector(*EYE), camera, depth))
+    bounces = tuple(tracer.follow(Vector(*EYE), camera, depth, proof.rays if proof else ()))
     shares = [bounce.contribution or (0.0, 0.0, 0.0) for bounce in bounces]
     red, green, blue = (sum(channel) for channel in zip(*shares, strict=True))
     quantised = quantise(np.array([red, green, blue]))
-    return Explanation(
-        model.name, column, row, bounces, (red, green, blue), (int(quantised[0]), int(quantised[1]), int(quantised[2]))
+    levels = (int(quantised[0]), int(quantised[1]), int(quantised[2]))
+    certified = (
+        None
+        if proof is None
+        else Certified(proof.proven, proof.complete, tuple(colour.value for colour in proof.colours))
     )
+    return Explanation(model.name, column, row, bounces, (red, green, blue), levels, certified)
+
+
+def _rules(model: Model) -> Rules | None:
+    """How the model departs from the one that proofs are about, if that is known."""
+    return next((rules for known, rules in ((DOCUMENT, DOCUMENT_RULES), (EXACT, EXACT_RULES)) if model is known), None)
 
 
 class _Tracer:
@@ -104,18 +140,26 @@ class _Tracer:
             *((_name("plane", plane, scene.planes), plane) for plane in read.planes),
         ]
 
-    def follow(self, origin: Any, direction: Any, limit: int) -> Iterator[Bounce]:
-        """Each ray in turn, until one hits nothing or nothing is reflected."""
+    def follow(self, origin: Any, direction: Any, limit: int, proven: Sequence[Ray]) -> Iterator[Bounce]:
+        """Each ray in turn, as far as they are `proven` from the proven one, until one hits nothing or none is left."""
         model, weight, leaving, window = self.model, 1.0, None, self.model.camera
+        camera_length = direction @ direction
         for depth in range(limit + 1):
+            truth = proven[depth] if depth < len(proven) else None
+            if truth and depth:
+                origin, direction = self.vector(truth.origin), self.vector(truth.d)
+                direction /= math.sqrt(direction @ direction)
             crossings = self.cross(origin, direction, window, leaving)
             ray = Bounce(depth, weight, _triple(origin), _triple(direction), tuple(crossings))
             met = [(crossing.counted[0], place) for place, crossing in enumerate(crossings) if crossing.counted]
+            if truth:
+                shrunk = math.sqrt(camera_length / (direction @ direction))
+                met = [(float(truth.hit.t.mid()) * shrunk, truth.hit.place)] if truth.hit else []
             if not met:
                 yield ray
                 return
             t, leaving = min(met)
-            bounce, point, normal = self.shade(ray, origin, direction, t, leaving)
+            bounce, point, normal = self.shade(ray, origin, direction, t, leaving, truth)
             yield bounce
             weight = float(model.reflected_weight(weight, self.surfaces[leaving][1].reflection, depth + 1))
             if weight == 0:
@@ -123,7 +167,11 @@ class _Tracer:
             origin, direction = model.reflected_origin(point, normal), model.reflected_direction(direction, normal)
             window = model.reflection
 
-    def shade(self, ray: Bounce, origin: Any, d: Any, t: float, hit: int) -> tuple[Bounce, Any, Any]:
+    def vector(self, point: Point) -> Any:
+        """A proven point or direction, rounded."""
+        return self.Vector(*(float(value.mid()) for value in point))
+
+    def shade(self, ray: Bounce, origin: Any, d: Any, t: float, hit: int, truth: Ray | None) -> tuple[Bounce, Any, Any]:
         """The bounce with its shading, the point and the normal."""
         model, (name, surface) = self.model, self.surfaces[hit]
         point = origin + d * t
@@ -136,7 +184,8 @@ class _Tracer:
         cosine = float(model.cosine(normal, to_light))
         crossings = self.cross(point, to_light, model.shadow, hit, shadow=True) if cosine else []
         blockers = tuple(crossing for crossing in crossings if crossing.counted)
-        diffuse = self.Vector(0) if blockers else model.diffuse(colour, surface.diffuse, cosine)
+        lit = truth.lit if truth and surface.diffuse else bool(cosine) and not blockers
+        diffuse = model.diffuse(colour, surface.diffuse, cosine) if lit else self.Vector(0)
         shaded = replace(
             ray,
             hit=name,
@@ -146,6 +195,7 @@ class _Tracer:
             ambient=_triple(ambient),
             cosine=cosine,
             to_light=_triple(to_light),
+            lit=lit,
             blockers=blockers,
             diffuse=_triple(diffuse),
             contribution=_triple((ambient + diffuse) * ray.weight),

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from flint import arb, ctx, fmpq
 
 from reference.scene import SCREEN, SCREEN_DISTANCE, Scene, Triple, merge_coincident
-from reference.walk import EXACT_RULES, Point, Rules, Tables, UnboundedError, UndecidedError, Walk
+from reference.walk import EXACT_RULES, Point, Ray, Rules, Tables, UnboundedError, UndecidedError, Walk
 
 PRECISIONS = (128, 512, 2048)  # bits; both sides of an undecided branch are followed only at the last one
 PROVEN = 1e-6  # levels (for a channel over 255, of 255ths of it): the largest radius of a proven colour
@@ -39,6 +39,7 @@ class Admissible:
     colours: tuple[Colour, ...]
     complete: bool
     bits: int
+    rays: tuple[Ray, ...] = field(default=(), compare=False, repr=False)  # of the first colour
 
     @property
     def proven(self) -> bool:
@@ -69,6 +70,7 @@ class Prover:
     def _follow(self, column: int, row: int, rules: Rules, bits: int, last: bool) -> Admissible:
         """Every path through the choices, depth first; raises UndecidedError unless this is the last precision."""
         found: list[Colour] = []
+        rays: list[Ray] = []
         complete = True
         path: list[int] | None = []
         with _precision(bits):
@@ -85,10 +87,11 @@ class Prover:
                         raise UndecidedError
                     if not any(_covers(other, colour) for other in found):
                         found.append(colour)
+                rays = rays or walk.rays
                 path = walk.next_path()
                 if path is None:
                     break
-        return Admissible(tuple(found), complete and path is None, bits)
+        return Admissible(tuple(found), complete and path is None, bits, tuple(rays))
 
     def _direction(self, column: int, row: int) -> Point:
         x = fmpq((2 * column + 1 - self.width) * int(SCREEN), self.width)

@@ -86,6 +86,15 @@ class Hit(NamedTuple):
     bounded: bool = True  # else t is the least that it can be
 
 
+class Ray(NamedTuple):
+    """A ray of the tree: what it hit, None for nothing, and whether that has a diffuse term."""
+
+    origin: Point
+    d: Point  # as long as the camera's
+    hit: Hit | None
+    lit: bool
+
+
 class Tables:
     """A scene as balls of the precision in force."""
 
@@ -101,6 +110,7 @@ class Walk:
     def __init__(self, tables: Tables, rules: Rules, path: list[int], may_choose: bool) -> None:
         self.tables, self.rules, self.path, self.may_choose = tables, rules, path, may_choose
         self.taken: list[tuple[int, int]] = []
+        self.rays: list[Ray] = []
 
     def choose(self, ways: int) -> int:
         """Which way to go where the balls cannot tell; the first is the model's rule for ties."""
@@ -126,11 +136,13 @@ class Walk:
         for depth in range(limit + 1):
             hit = self.nearest(origin, d, leaving)
             if hit is None:
+                self.rays.append(Ray(origin, d, None, lit=False))
                 break
             surface = self.tables.surfaces[hit.place]
             point = self.loosened(_along(origin, hit.t, d))
             arm = _minus(point, surface.centre) if isinstance(surface, HeldSphere) else surface.normal
             cosine = self.cosine(surface, point, arm, hit.place) if hit.bounded else self.far_cosine(hit, origin, d)
+            self.rays.append(Ray(origin, d, hit, lit=not cosine.is_zero()))
             lit = surface.diffuse * cosine
             red, green, blue = (
                 sum_ + weight * colour * (ambient + lit)

@@ -18,7 +18,7 @@ KNIFE_EDGE, DOCUMENT_WINDOW = "knife-edge", "document-window"
 PRECISION, LIMIT = "renderer-precision", "declared-limit"
 CLASSES = {
     KNIFE_EDGE: "No precision can decide the pixel, and this is one of the colours that it may have.",
-    DOCUMENT_WINDOW: "The colour by the document's text, where its smallest distance of 1e-4 parts from the exact model.",
+    DOCUMENT_WINDOW: "The colour by the document's text, whose smallest distance is 1e-4 where the truth has none.",
     PRECISION: "Closer to a branch than the renderer's precision can tell, and the colour on the other side of it.",
     LIMIT: "The colour without what is closer to the start of a ray than the renderer can see.",
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from reference.explanation import Bounce, Crossing, Explanation
+from reference.explanation import Bounce, Certified, Crossing, Explanation
 
 AGREE = 1e-9  # levels
 
@@ -19,6 +19,16 @@ def ray_tree(explanation: Explanation) -> Iterator[str]:
     yield f"sum      {_triple(explanation.colour)}"
     yield f"clamped  {_triple(tuple(min(255.0, max(0.0, value)) for value in explanation.colour))}"
     yield f"8 bit    {' '.join(map(str, explanation.bytes))}"
+    if explanation.certified:
+        yield f"proof    {_proof(explanation.certified)}"
+
+
+def _proof(certified: Certified) -> str:
+    if certified.proven:
+        return "this colour is proven"
+    colours = [_triple(colour) for colour in certified.colours]
+    others = "" if certified.complete else " or others that could not be found"
+    return f"a knife edge, which no precision can decide: {' or '.join(colours)}{others}"
 
 
 def _bounce(bounce: Bounce) -> Iterator[str]:
@@ -38,7 +48,7 @@ def _bounce(bounce: Bounce) -> Iterator[str]:
     yield f"  ambient  {_triple(bounce.ambient)}"
     for blocker in bounce.blockers:
         yield f"  shadow   of {_crossing(blocker)}"
-    reason = "in shadow" if bounce.blockers else "facing away from the light" if not bounce.cosine else "lit"
+    reason = "lit" if bounce.lit else "in shadow" if bounce.cosine else "facing away from the light"
     yield f"  diffuse  {_triple(bounce.diffuse)}  {reason}, n.l = {bounce.cosine:.9g}"
     yield f"  gives    {_triple(bounce.contribution)}  = {bounce.weight:.6g} x (ambient + diffuse)"
 
@@ -54,8 +64,8 @@ def parting(one: Explanation, other: Explanation) -> str:
     for a, b in zip(one.bounces, other.bounces, strict=False):
         if a.hit != b.hit:
             return f"{names} part at ray {a.depth}: it hits {a.hit or 'nothing'} and {b.hit or 'nothing'}"
-        if bool(a.blockers) != bool(b.blockers):
-            lit, dark = (one, other) if b.blockers else (other, one)
+        if a.lit != b.lit:
+            lit, dark = (one, other) if a.lit else (other, one)
             return f"{names} part at ray {a.depth}: it is lit in {lit.convention} and in shadow in {dark.convention}"
         if abs(a.weight - b.weight) > AGREE:
             return f"{names} part at ray {a.depth}: {a.weight:.6g} and {b.weight:.6g} of it reach the eye"

@@ -74,7 +74,7 @@ def test_text_for_people() -> None:
     text = "\n".join(ray_tree(explain(Scene.load(EXAMPLE), column=300, row=900)))
     assert "shadow   of sphere 2, lines 9-13 at t = 0.0122" in text
     assert "bounce 2, of which 0.2 reaches the eye" in text
-    assert text.endswith("8 bit    116 61 50")
+    assert text.endswith("8 bit    116 61 50\nproof    this colour is proven")
     miss = "\n".join(ray_tree(explain(parse("0 0 0\n0\n0\n0\n"), column=0, row=0)))
     assert "hits     nothing: black" in miss
 
