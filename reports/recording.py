@@ -75,6 +75,8 @@ class Recording:
             "command": "",
             "log": "",
             "notes": [],
+            "limits": {},
+            "summary": None,
         }
 
     def _unique(self, name: str) -> str:

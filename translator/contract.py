@@ -8,6 +8,7 @@ A renderer is one module in `translator/renderers`; its name there (`_` read as 
     TIMING   pattern: group 1 in the log of a run is the seconds that tracing alone took
     export   (scene, settings) -> Export: pure, the same files for the same scene, with nothing installed.
              Raises Unsupported for what the renderer cannot carry, before anything runs.
+    SUMMARY  (may be missing) pattern: what in the log of a run belongs in the report
 """
 
 from __future__ import annotations

@@ -53,6 +53,7 @@ class Outcome:
     log: str = ""
     notes: tuple[str, ...] = ()
     limits: Mapping[str, float] = field(default_factory=dict)
+    summary: str | None = None
 
 
 def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 600) -> Outcome:
@@ -86,6 +87,7 @@ def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 6
     seconds = time.perf_counter() - start
     timing = re.search(renderer.TIMING, log)
     trace_seconds = float(timing[1]) if timing else None
+    summary = re.search(getattr(renderer, "SUMMARY", r"(?!)"), log)
     return Outcome(
         name,
         renderer.TITLE,
@@ -99,6 +101,7 @@ def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 6
         log,
         export.notes,
         asdict(export.limits),
+        summary[0] if summary else None,
     )
 
 

@@ -3,7 +3,8 @@
     make bench
 
 Tracing: the tracer's own time for 1000 x 1000 pixels and three bounces, in double precision, with a warm kernel, up to
-the picture in memory; for the others the time that they report themselves. Whole process: from the command to the
+the picture in memory; for the others the time that they report themselves. Proving: every pixel, in the same process.
+Whole process: from the command to the
 picture on disk, for crossray with a warm kernel cache.
 """
 
@@ -23,6 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 from reference import Scene, render
+from reference.certification import certify
 from reference.errors import RendererError
 from translator.contract import Settings
 from translator.registry import adapter
@@ -43,6 +45,11 @@ def seconds(action: Callable[[], object]) -> float:
 def render_seconds(scene: Scene, precision: str) -> float:
     """crossray's tracing up to the picture in memory, the median of a few."""
     return median(seconds(partial(render, scene, precision=precision)) for _ in range(RENDERS))
+
+
+def certify_seconds(scene: Scene) -> float:
+    """Proving every pixel, the median of a few."""
+    return median(seconds(partial(certify, scene)) for _ in range(RENDERS))
 
 
 def trace_seconds(name: str, scene: Scene) -> float:
@@ -84,9 +91,14 @@ def main() -> None:
     peers = [name for name in PEERS if installed_version(name)]
     tracing = Table("scene", *(f"{name} / crossray" for name in peers), "crossray double", "single", *peers)
     whole = Table("scene", "povray / crossray", "crossray render", "povray")
+    proving = Table("scene", "certify / crossray double", "certify")
     for path in sorted((ROOT / "scenes").glob("example?.txt")):
         scene = Scene.load(path)
         ours = {name: partial(render_seconds, scene, name) for name in ("double", "single")}
+        times = in_turn({"double": ours["double"], "certify": partial(certify_seconds, scene)})
+        proving.add_row(
+            path.stem, ratio(times["certify"], times["double"]), f"{1000 * median(times['certify']):.1f} ms"
+        )
         times = in_turn(ours | {name: partial(trace_seconds, name, scene) for name in peers})
         ratios = [ratio(times[name], times["double"]) for name in peers]
         tracing.add_row(path.stem, *ratios, *(f"{1000 * median(taken):.1f} ms" for taken in times.values()))
@@ -97,6 +109,7 @@ def main() -> None:
             whole.add_row(path.stem, ratio(times["povray"], times["crossray"]), *taken)
     console = Console(width=110)
     console.print("Tracing, 1000 x 1000, three bounces, medians:", tracing)
+    console.print("Proving every pixel, 1000 x 1000, three bounces, medians:", proving)
     console.print("Whole process, scene file to picture file, medians:", whole)
 
 

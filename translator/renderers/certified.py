@@ -10,6 +10,7 @@ TITLE = "Certified truth"
 INSTALL = "pip install crossray"
 VERSION = ((PYTHON, "-m", "crossray", "--version"), r"crossray (\S+)")
 TIMING = r"certified in ([0-9.e-]+) s"
+SUMMARY = r"\d+ pixels: .*"
 
 
 def export(scene: Scene, settings: Settings) -> Export:
