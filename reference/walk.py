@@ -86,6 +86,14 @@ class Hit(NamedTuple):
     bounded: bool = True  # else t is the least that it can be
 
 
+class _Window(NamedTuple):
+    """What counts along a ray: from `least` on, surely from `clear` on; planes with |d.n| up to `missed` do not."""
+
+    least: arb
+    clear: arb
+    missed: arb
+
+
 class Ray(NamedTuple):
     """A ray of the tree: what it hit, None for nothing, and whether that has a diffuse term."""
 
@@ -168,26 +176,26 @@ class Walk:
     def nearest(self, origin: Point, d: Point, leaving: int | None) -> Hit | None:
         """The first hit along the ray; by choice where several may be the first."""
         dd = _dot(d, d)
-        length = dd.sqrt()
-        least = ONE if leaving is None else _ball(self.rules.reflection) / length
+        window = self.window(leaving, dd.sqrt())
         hits: list[Hit] = []
         for index, surface in enumerate(self.tables.surfaces):
             if isinstance(surface, HeldSphere):
-                hits += _meet_sphere(index, surface, origin, d, dd, leaving, least)
+                hits += _meet_sphere(index, surface, origin, d, dd, leaving, window)
             elif index != leaving:
-                hits += _meet_plane(index, surface, origin, d, leaving, least, self.missed(leaving, length))
-        if self.rules.gap and leaving is not None:
-            near = arb(self.rules.gap) / length
-            hits = [hit if hit.t > near else hit._replace(sure=False) for hit in hits]
+                hits += _meet_plane(index, surface, origin, d, leaving, window)
         sure = [hit for hit in hits if hit.sure]
         if not sure:
             return _choose_hit(self, [*hits, None])
         first = min(sure, key=lambda hit: float(hit.t.upper()))
         return _choose_hit(self, [hit for hit in hits if not hit.t > first.t])
 
-    def missed(self, leaving: int | None, length: arb) -> arb:
-        """The largest |d.n| at which a plane is missed: the camera's directions are not at unit length."""
-        return _ball(self.rules.grazing) * (ONE if leaving is None else length)
+    def window(self, leaving: int | None, length: arb) -> _Window:
+        """What counts along a ray; the rules of mirrored rays are about directions at unit length."""
+        missed = _ball(self.rules.grazing)
+        if leaving is None:
+            return _Window(ONE, ONE, missed)
+        clear = max(self.rules.reflection, self.rules.gap)
+        return _Window(_ball(self.rules.reflection) / length, _ball(clear) / length, missed * length)
 
     def cosine(self, surface: HeldSphere | HeldPlane, point: Point, arm: Point, index: int) -> arb:
         """n.l where the light reaches the point, else 0."""
@@ -274,7 +282,7 @@ def _choose_hit(walk: Walk, ways: list[Hit | None]) -> Hit | None:
 
 
 def _meet_sphere(
-    index: int, sphere: HeldSphere, origin: Point, d: Point, dd: arb, leaving: int | None, least: arb
+    index: int, sphere: HeldSphere, origin: Point, d: Point, dd: arb, leaving: int | None, window: _Window
 ) -> Iterator[Hit]:
     """The roots that may count, up to the first that surely does if the ray meets the sphere at all."""
     p = _minus(origin, sphere.centre)
@@ -291,29 +299,29 @@ def _meet_sphere(
         root = squared.sqrt() if sure else ZERO.union(squared.upper().sqrt())
         roots = [(-half - root) / dd, (root - half) / dd]
     for t in roots:
-        counts = bool(t > least)
-        if counts or not t <= least:
-            yield Hit(t, index, sure and counts, counts)
-        if counts:
+        counts, clear = bool(t > window.least), bool(t > window.clear)
+        if counts or not t <= window.least:
+            yield Hit(t, index, sure and clear, counts)
+        if clear:
             return
 
 
 def _meet_plane(
-    index: int, plane: HeldPlane, origin: Point, d: Point, leaving: int | None, least: arb, missed: arb
+    index: int, plane: HeldPlane, origin: Point, d: Point, leaving: int | None, window: _Window
 ) -> Iterator[Hit]:
     """The crossing if it may count. Along a plane, what is farther than any bound, or a miss by the rule for ties."""
     if leaving is None and (plane.offset.is_zero() or plane.is_screen):
         return
     side = plane.offset if leaving is None else plane.offset - _dot(origin, plane.normal)
     facing = _dot(d, plane.normal)
-    if abs(facing) <= missed * plane.length and not missed.is_zero():
+    slope, missed = abs(facing), window.missed * plane.length
+    if not missed.is_zero() and slope <= missed:
         return
     if facing > 0 or facing < 0:
         t = side / facing
-        counts = bool(t > least)
-        if counts or not t <= least:
-            sure = counts and (missed.is_zero() or bool(abs(facing) > missed * plane.length))
-            yield Hit(t, index, sure, counts)
+        counts = bool(t > window.least)
+        if counts or not t <= window.least:
+            yield Hit(t, index, bool(t > window.clear and (missed.is_zero() or slope > missed)), counts)
         return
     farther = side.abs_lower() / facing.abs_upper()
     yield Hit(farther, index, sure=False, ruled=False, bounded=False)
