@@ -14,7 +14,7 @@ from reference.sweep import sweep
 from reference.tracer import check_request
 
 UNDECIDED, KNIFE_EDGE, CERTAIN = 0, 128, 255
-WORK = 20_000_000  # pixels times surfaces that are proven one by one; what is left then stays undecided
+WORK = 200_000_000  # pixels times surfaces that are proven one by one; what is left then stays undecided
 STEPS = 100  # of the progress
 
 

@@ -137,17 +137,15 @@ def _radiance(world: BallWorld, d: Arrow, dd: Ball, limit: Number) -> tuple[Numb
         to_light = world.light - point
         distance = to_light.square().root()
         cosine = normal.dot(to_light).where(hit < world.first_plane, Ball(-row[6], row[7])) / distance
-        lost |= ~(distance.beyond(0) & (normal.radius < STRAIGHT / 2) & (onto.radius < onto.length * (STRAIGHT / 4)))
+        lost |= ~(distance.beyond(0) & (normal.radius < STRAIGHT / 2))
 
         lit, dark = cosine.beyond(0), cosine.below(0)
         blocked, free = shadow(world, point, to_light, hit, lit)
         lit_surely, dark_surely = lit & free, dark | (lit & blocked)
         shown = dr.select(lit_surely, cosine.value, 0)
         open_ = dr.select(lit_surely, cosine.radius, dr.select(dark_surely, 0, dr.abs(cosine.value) + cosine.radius))
-        surface, brightest = (
-            world.Vector(red, green, blue),
-            dr.maximum(dr.abs(red), dr.maximum(dr.abs(green), dr.abs(blue))),
-        )
+        surface = world.Vector(red, green, blue)
+        brightest = dr.max(dr.abs(surface))
         local = surface * dr.fma(world.Vector(diffuse), shown, world.ambient)
         rounding = (world.brightest + dr.abs(diffuse)) * (UNIT * (4 + 2 * world.Float(depth)))
         colour = dr.fma(local, weight, colour)
@@ -164,6 +162,7 @@ def _radiance(world: BallWorld, d: Arrow, dd: Ball, limit: Number) -> tuple[Numb
             origin, origin_radius = point.value, point.radius
             direction, direction_radius = mirrored.value, mirrored.radius
             t, t_radius, hit, lost = nearest(world, _Ray(point, mirrored, dd, leaving), False, onward)
+            lost |= ~(direction_radius < d.length * (STRAIGHT / 4))
         radius = dr.select(lost, dr.inf, radius)
     return colour, dr.select(lost, dr.inf, radius)
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import chain
 from typing import NamedTuple
 
+import numpy as np
 from flint import arb, fmpq
+from numpy.typing import NDArray
 
 from reference.scene import EYE, LIGHT, SCREEN_DISTANCE, Plane, Scene, Sphere, exact
 
@@ -15,6 +18,8 @@ Point = tuple[arb, arb, arb]
 Verdict = bool | None  # None: the balls cannot tell
 
 ZERO, ONE = arb(0), arb(1)
+FEW = 24  # spheres that are cheaper met one by one
+ROUNDING = 1e-14  # more than what a handful of operations in double precision lose, relatively
 
 
 @dataclass(frozen=True)
@@ -110,6 +115,30 @@ class Tables:
         self.ambient = _point(exact(value) * exact(scene.ambient_coefficient) / 256 for value in scene.ambient)
         self.light, self.eye = _point(map(exact, LIGHT)), _point(map(exact, EYE))
         self.surfaces: list[HeldSphere | HeldPlane] = [*map(_sphere, scene.spheres), *map(_plane, scene.planes)]
+        self.centres = np.array([sphere.centre for sphere in scene.spheres], dtype=float).reshape(-1, 3)
+        self.radii = np.array([sphere.radius for sphere in scene.spheres], dtype=float)
+        self.planes = range(len(scene.spheres), len(self.surfaces))
+
+    def along(self, origin: Point, d: Point) -> Iterator[tuple[int, HeldSphere | HeldPlane]]:
+        """The surfaces that a line may meet, with their places: all but spheres that it surely misses."""
+        places: Iterable[int] = range(len(self.surfaces))
+        if len(self.radii) > FEW:
+            places = chain(np.flatnonzero(~self._misses(origin, d)).tolist(), self.planes)
+        return ((place, self.surfaces[place]) for place in places)
+
+    def _misses(self, origin: Point, d: Point) -> NDArray[np.bool_]:
+        """For each sphere, whether half^2 < dd (p.p - r^2) beyond all doubt: in double precision, with its error."""
+        (start, start_error), (direction, direction_error) = map(_rounded_point, (origin, d))
+        p = start - self.centres
+        reach, length = np.sqrt((p * p).sum(axis=1)), float(np.sqrt(direction @ direction))
+        half, dd = p @ direction, length * length
+        p_error = start_error + ROUNDING * np.abs(self.centres).max(axis=1)
+        half_error = p_error * length + direction_error * (reach + p_error) + ROUNDING * reach * length
+        outside = reach * reach - self.radii**2
+        error = half_error * (2 * np.abs(half) + half_error) + dd * p_error * (2 * reach + p_error)
+        error += direction_error * (2 * length + direction_error) * np.abs(outside)
+        error += ROUNDING * (half * half + dd * (reach * reach + self.radii**2))
+        return np.asarray(half * half - dd * outside < -2 * error)
 
 
 class Walk:
@@ -178,7 +207,7 @@ class Walk:
         dd = _dot(d, d)
         window = self.window(leaving, dd.sqrt())
         hits: list[Hit] = []
-        for index, surface in enumerate(self.tables.surfaces):
+        for index, surface in self.tables.along(origin, d):
             if isinstance(surface, HeldSphere):
                 hits += _meet_sphere(index, surface, origin, d, dd, leaving, window)
             elif index != leaving:
@@ -216,7 +245,7 @@ class Walk:
         start = _ball(self.rules.shadow)
         late = max(start, arb(self.rules.gap) / distance, key=lambda share: float(share.upper()))
         doubts = []
-        for index, surface in enumerate(self.tables.surfaces):
+        for index, surface in self.tables.along(point, to_light):
             verdict, ruled = self.blocks(surface, point, to_light, index == leaving, start)
             if verdict and self.rules.gap:
                 verdict, ruled = self.blocks(surface, point, to_light, index == leaving, late)[0] or None, True
@@ -403,6 +432,13 @@ def _ball(value: Fraction | float) -> arb:
 def _point(values: Iterable[Fraction]) -> Point:
     x, y, z = map(_ball, values)
     return (x, y, z)
+
+
+def _rounded_point(point: Point) -> tuple[NDArray[np.float64], float]:
+    """In double precision, and the most that it is off."""
+    value = np.array([float(ball.mid()) for ball in point])
+    error = sum(float(ball.rad()) for ball in point)
+    return value, float(error + ROUNDING * np.abs(value).max())
 
 
 def _dot(a: Point, b: Point) -> arb:
