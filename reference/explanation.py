@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from reference.device import load_drjit
+from reference.enclosure import Point
 from reference.errors import InputError
 from reference.image import quantise
 from reference.model import DOCUMENT, EXACT, Model, Window
 from reference.proof import Prover
+from reference.rules import DOCUMENT_RULES, EXACT_RULES, Rules
 from reference.scene import EYE, LIGHT, Plane, Scene, Sphere, Triple, holds_light
-from reference.walk import DOCUMENT_RULES, EXACT_RULES, Point, Ray, Rules
+from reference.walk import Ray
 
 Surface = Sphere | Plane
 LARGEST_PROOF = 5000  # surfaces, so that an answer takes less than a second

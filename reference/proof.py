@@ -7,15 +7,15 @@ way a ray goes, not even at the highest precision, the pixel is a knife edge and
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from flint import arb, ctx, fmpq
+from flint import arb, fmpq
 
+from reference.enclosure import Point, Tables, precision
+from reference.rules import EXACT_RULES, Rules
 from reference.scene import SCREEN, SCREEN_DISTANCE, Scene, Triple, merge_coincident
-from reference.walk import EXACT_RULES, Point, Ray, Rules, Tables, UnboundedError, UndecidedError, Walk
+from reference.walk import Ray, UnboundedError, UndecidedError, Walk
 
 PRECISIONS = (128, 512, 2048)  # bits; both sides of an undecided branch are followed only at the last one
 PROVEN = 1e-6  # levels (for a channel over 255, of 255ths of it): the largest radius of a proven colour
@@ -73,7 +73,7 @@ class Prover:
         rays: list[Ray] = []
         complete = True
         path: list[int] | None = []
-        with _precision(bits):
+        with precision(bits):
             tables = self._tables[bits] = self._tables.get(bits) or Tables(self.scene)
             for _ in range(LARGEST_SET):
                 walk = Walk(tables, rules, path or [], may_choose=last)
@@ -82,10 +82,11 @@ class Prover:
                 except UnboundedError:
                     complete = False
                 else:
-                    complete &= rules.has_leeway or _is_sharp(colour)
-                    if not (complete or last):
+                    sharp = rules.has_leeway or _is_sharp(colour)
+                    if not (sharp or last):
                         raise UndecidedError
-                    if not any(_covers(other, colour) for other in found):
+                    complete &= sharp
+                    if all(map(math.isfinite, colour.value)) and not any(_covers(other, colour) for other in found):
                         found.append(colour)
                 rays = rays or walk.rays
                 path = walk.next_path()
@@ -99,15 +100,6 @@ class Prover:
         return (arb(x), arb(y), arb(SCREEN_DISTANCE))
 
 
-@contextmanager
-def _precision(bits: int) -> Iterator[None]:
-    before, ctx.prec = ctx.prec, bits
-    try:
-        yield
-    finally:
-        ctx.prec = before
-
-
 def _rounded(colour: Point) -> Colour:
     """In double precision, the rounding added to the radius."""
     value = (float(colour[0].mid()), float(colour[1].mid()), float(colour[2].mid()))
@@ -116,8 +108,11 @@ def _rounded(colour: Point) -> Colour:
 
 
 def _is_sharp(colour: Colour) -> bool:
-    """Whether each channel is proven; NaN is not."""
-    return all(r <= PROVEN * max(1.0, abs(v) / 255) for v, r in zip(colour.value, colour.radius, strict=True))
+    """Whether each channel is proven; infinity and NaN are not."""
+    return all(
+        math.isfinite(v) and r <= PROVEN * max(1.0, abs(v) / 255)
+        for v, r in zip(colour.value, colour.radius, strict=True)
+    )
 
 
 def _covers(one: Colour, other: Colour) -> bool:

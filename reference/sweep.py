@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 
 from reference.balls import UNIT, Arrow, Ball, Mask, Number
 from reference.device import Types, array_types
+from reference.enclosure import HeldPlane, HeldSphere, Tables, precision
 from reference.scene import EYE, LIGHT, SCREEN, SCREEN_DISTANCE, Plane, Scene, Sphere, Triple, merge_coincident
 from reference.tracer import BAND, NOTHING, Rows, State, materials, pixel_places
-from reference.walk import HeldPlane, HeldSphere, Tables
 
 SMALLEST, LARGEST = 1e-30, 1e30  # of the scene's numbers, so that no product under- or overflows
 STRAIGHT = 2.0**-20  # the largest relative error of a direction, beyond which a ray gives up
+FAINTEST = 1e-200  # share of a ray: what is fainter may come back only where mirrors make it brighter again
 WIDTH = 12  # numbers of each surface
+PRECISION = 128  # bits, of the numbers before they are rounded
 
 
 def sweep(scene: Scene, *, width: int, height: int, depth: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -43,7 +45,7 @@ def sweep(scene: Scene, *, width: int, height: int, depth: int) -> tuple[NDArray
         # Without surfaces there is one value for all pixels.
         picture[band].reshape(-1, 3)[:] = dr.ravel(colour).numpy().reshape(-1, 3)
         radius[band].reshape(-1)[:] = error.numpy()
-    return picture, np.nan_to_num(radius, nan=np.inf)
+    return picture, np.where(np.isnan(radius), np.inf, radius)
 
 
 def _is_tame(scene: Scene) -> bool:
@@ -65,10 +67,12 @@ class BallWorld(Rows):
     """
 
     def __init__(self, scene: Scene, types: Types) -> None:
-        tables = Tables(scene)
-        geometry = [_sphere_row(s) if isinstance(s, HeldSphere) else _plane_row(s) for s in tables.surfaces]
+        with precision(PRECISION):
+            tables = Tables(scene)
+            geometry = [_sphere_row(s) if isinstance(s, HeldSphere) else _plane_row(s) for s in tables.surfaces]
+            ambient = [_nearest(value)[0] for value in tables.ambient]
         super().__init__(types, len(scene.spheres), geometry, materials(scene), WIDTH)
-        ambient = [_nearest(value)[0] for value in tables.ambient]
+        self.fading = all(abs(mirror) <= 1 for _, _, _, _, mirror, *_ in materials(scene))
         self.ambient = self.Vector(*map(self._uniform, ambient))
         self.brightest = self._uniform(max(map(abs, ambient)))
         self.eye, self.light = self.held(EYE), self.held(LIGHT)
@@ -156,6 +160,8 @@ def _radiance(world: BallWorld, d: Arrow, dd: Ball, limit: Number) -> tuple[Numb
         weight *= mirror
         leaving = hit
         hit = world.Index(NOTHING)
+        if not world.fading:
+            lost |= (mirror != 0) & (dr.abs(weight) < FAINTEST)
         onward = (depth <= limit) & (weight != 0) & ~lost
         if onward:
             mirrored = _mirrored(onto, normal)

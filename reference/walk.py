@@ -2,50 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from fractions import Fraction
-from itertools import chain
+from collections.abc import Iterator
 from typing import NamedTuple
 
-import numpy as np
-from flint import arb, fmpq
-from numpy.typing import NDArray
+from flint import arb
 
-from reference.scene import EYE, LIGHT, SCREEN_DISTANCE, Plane, Scene, Sphere, exact
+from reference.enclosure import HeldPlane, HeldSphere, Point, Tables, along, ball, dot, minus, mirrored
+from reference.rules import Rules
 
-Point = tuple[arb, arb, arb]
 Verdict = bool | None  # None: the balls cannot tell
 
 ZERO, ONE = arb(0), arb(1)
-FEW = 24  # spheres that are cheaper met one by one
-ROUNDING = 1e-14  # more than what a handful of operations in double precision lose, relatively
-
-
-@dataclass(frozen=True)
-class Rules:
-    """In what a tracer departs from the `exact` convention; as they are by default, in nothing.
-
-    `shadow`: blockers count from this share of the way to the light. `reflection`: what mirrors show counts from this
-    distance. `grazing`: planes with |d.n| up to this are missed. The others are leeway, within which every outcome is
-    admissible: `precision`: relative error of each point and direction. `gap`: what is nearer than this to the start
-    of a secondary ray may count or not.
-    """
-
-    shadow: float = 0.0
-    reflection: float = 0.0
-    grazing: float = 0.0
-    precision: float = 0.0
-    gap: float = 0.0
-
-    @property
-    def has_leeway(self) -> bool:
-        """Whether a pixel's colours are ranges."""
-        return bool(self.precision or self.gap)
-
-
-EXACT_RULES = Rules()
-DOCUMENT_RULES = Rules(shadow=1e-4, reflection=1e-4, grazing=1e-6)
 
 
 class UndecidedError(Exception):
@@ -54,31 +21,6 @@ class UndecidedError(Exception):
 
 class UnboundedError(Exception):
     """A mirrored ray starts at an unlimited distance, among surfaces that it does not leave behind."""
-
-
-class HeldSphere(NamedTuple):
-    """A sphere in balls."""
-
-    colour: Point
-    diffuse: arb
-    reflection: arb
-    centre: Point
-    radius: arb
-    at_eye: arb  # |eye - centre|^2 - r^2
-    at_light: arb  # |light - centre|^2 - r^2, exactly 0 if the light is on the sphere
-
-
-class HeldPlane(NamedTuple):
-    """A plane in balls."""
-
-    colour: Point
-    diffuse: arb
-    reflection: arb
-    normal: Point  # as written, of any length
-    length: arb
-    offset: arb  # point.normal, exactly 0 if the eye is in the plane
-    from_light: arb  # (point - light).normal, exactly 0 if the light is in the plane
-    is_screen: bool
 
 
 class Hit(NamedTuple):
@@ -106,39 +48,6 @@ class Ray(NamedTuple):
     d: Point  # as long as the camera's
     hit: Hit | None
     lit: bool
-
-
-class Tables:
-    """A scene as balls of the precision in force."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.ambient = _point(exact(value) * exact(scene.ambient_coefficient) / 256 for value in scene.ambient)
-        self.light, self.eye = _point(map(exact, LIGHT)), _point(map(exact, EYE))
-        self.surfaces: list[HeldSphere | HeldPlane] = [*map(_sphere, scene.spheres), *map(_plane, scene.planes)]
-        self.centres = np.array([sphere.centre for sphere in scene.spheres], dtype=float).reshape(-1, 3)
-        self.radii = np.array([sphere.radius for sphere in scene.spheres], dtype=float)
-        self.planes = range(len(scene.spheres), len(self.surfaces))
-
-    def along(self, origin: Point, d: Point) -> Iterator[tuple[int, HeldSphere | HeldPlane]]:
-        """The surfaces that a line may meet, with their places: all but spheres that it surely misses."""
-        places: Iterable[int] = range(len(self.surfaces))
-        if len(self.radii) > FEW:
-            places = chain(np.flatnonzero(~self._misses(origin, d)).tolist(), self.planes)
-        return ((place, self.surfaces[place]) for place in places)
-
-    def _misses(self, origin: Point, d: Point) -> NDArray[np.bool_]:
-        """For each sphere, whether half^2 < dd (p.p - r^2) beyond all doubt: in double precision, with its error."""
-        (start, start_error), (direction, direction_error) = map(_rounded_point, (origin, d))
-        p = start - self.centres
-        reach, length = np.sqrt((p * p).sum(axis=1)), float(np.sqrt(direction @ direction))
-        half, dd = p @ direction, length * length
-        p_error = start_error + ROUNDING * np.abs(self.centres).max(axis=1)
-        half_error = p_error * length + direction_error * (reach + p_error) + ROUNDING * reach * length
-        outside = reach * reach - self.radii**2
-        error = half_error * (2 * np.abs(half) + half_error) + dd * p_error * (2 * reach + p_error)
-        error += direction_error * (2 * length + direction_error) * np.abs(outside)
-        error += ROUNDING * (half * half + dd * (reach * reach + self.radii**2))
-        return np.asarray(half * half - dd * outside < -2 * error)
 
 
 class Walk:
@@ -176,8 +85,8 @@ class Walk:
                 self.rays.append(Ray(origin, d, None, lit=False))
                 break
             surface = self.tables.surfaces[hit.place]
-            point = self.loosened(_along(origin, hit.t, d))
-            arm = _minus(point, surface.centre) if isinstance(surface, HeldSphere) else surface.normal
+            point = self.loosened(along(origin, hit.t, d))
+            arm = minus(point, surface.centre) if isinstance(surface, HeldSphere) else surface.normal
             cosine = self.cosine(surface, point, arm, hit.place) if hit.bounded else self.far_cosine(hit, origin, d)
             self.rays.append(Ray(origin, d, hit, lit=not cosine.is_zero()))
             lit = surface.diffuse * cosine
@@ -192,7 +101,7 @@ class Walk:
                 self.leave_behind(hit, origin, d)
                 break
             weight = weight * surface.reflection
-            origin, d, leaving = point, self.loosened(_mirrored(d, arm, surface)), hit.place
+            origin, d, leaving = point, self.loosened(mirrored(d, arm, surface)), hit.place
         return total
 
     def loosened(self, point: Point) -> Point:
@@ -204,7 +113,7 @@ class Walk:
 
     def nearest(self, origin: Point, d: Point, leaving: int | None) -> Hit | None:
         """The first hit along the ray; by choice where several may be the first."""
-        dd = _dot(d, d)
+        dd = dot(d, d)
         window = self.window(leaving, dd.sqrt())
         hits: list[Hit] = []
         for index, surface in self.tables.along(origin, d):
@@ -220,18 +129,18 @@ class Walk:
 
     def window(self, leaving: int | None, length: arb) -> _Window:
         """What counts along a ray; the rules of mirrored rays are about directions at unit length."""
-        missed = _ball(self.rules.grazing)
+        missed = ball(self.rules.grazing)
         if leaving is None:
             return _Window(ONE, ONE, missed)
         clear = max(self.rules.reflection, self.rules.gap)
-        return _Window(_ball(self.rules.reflection) / length, _ball(clear) / length, missed * length)
+        return _Window(ball(self.rules.reflection) / length, ball(clear) / length, missed * length)
 
     def cosine(self, surface: HeldSphere | HeldPlane, point: Point, arm: Point, index: int) -> arb:
         """n.l where the light reaches the point, else 0."""
-        to_light = _minus(self.tables.light, point)
-        distance = _dot(to_light, to_light).sqrt()
+        to_light = minus(self.tables.light, point)
+        distance = dot(to_light, to_light).sqrt()
         if isinstance(surface, HeldSphere):
-            cosine = _dot(arm, to_light) / (surface.radius * distance)
+            cosine = dot(arm, to_light) / (surface.radius * distance)
         else:
             cosine = -surface.from_light / (surface.length * distance)
         if surface.diffuse.is_zero() or cosine <= 0:
@@ -242,7 +151,7 @@ class Walk:
 
     def blocked(self, point: Point, to_light: Point, distance: arb, leaving: int) -> bool:
         """Whether a surface stands before the light; by choice where that is open."""
-        start = _ball(self.rules.shadow)
+        start = ball(self.rules.shadow)
         late = max(start, arb(self.rules.gap) / distance, key=lambda share: float(share.upper()))
         doubts = []
         for index, surface in self.tables.along(point, to_light):
@@ -265,7 +174,7 @@ class Walk:
             return _sphere_blocks(surface, point, to_light, left, start)
         if left or surface.from_light.is_zero():
             return False, False
-        side = surface.offset - _dot(point, surface.normal)
+        side = surface.offset - dot(point, surface.normal)
         if self.rules.grazing and abs(side - surface.from_light) <= arb(self.rules.grazing) * surface.length:
             return False, False
         return _opposite(side * (1 - start) + surface.from_light * start, surface.from_light), False
@@ -274,8 +183,8 @@ class Walk:
         """n.l of a plane at a distance of at least hit.t along d: at most its distance from the light over that."""
         plane = self.tables.surfaces[hit.place]
         assert isinstance(plane, HeldPlane)
-        to_light = _minus(self.tables.light, origin)
-        least = hit.t * _dot(d, d).sqrt() - _dot(to_light, to_light).sqrt()
+        to_light = minus(self.tables.light, origin)
+        least = hit.t * dot(d, d).sqrt() - dot(to_light, to_light).sqrt()
         if not least > 0:
             raise UnboundedError
         return ZERO.union((abs(plane.from_light) / (plane.length * least)).upper())
@@ -284,18 +193,18 @@ class Walk:
         """Raise UnboundedError unless the ray mirrored at a distance of at least hit.t meets nothing any more."""
         plane = self.tables.surfaces[hit.place]
         assert isinstance(plane, HeldPlane)
-        onward = _mirrored(d, plane.normal, plane)
+        onward = mirrored(d, plane.normal, plane)
         for index, surface in enumerate(self.tables.surfaces):
             if index == hit.place:
                 continue
             if isinstance(surface, HeldSphere):
-                p = _minus(origin, surface.centre)
-                behind = hit.t * _dot(d, onward) > abs(_dot(p, onward))
-                behind &= hit.t * _dot(d, d).sqrt() > _dot(p, p).sqrt() + surface.radius
+                p = minus(origin, surface.centre)
+                behind = hit.t * dot(d, onward) > abs(dot(p, onward))
+                behind &= hit.t * dot(d, d).sqrt() > dot(p, p).sqrt() + surface.radius
             else:
-                slope, slope_onward = _dot(d, surface.normal), _dot(onward, surface.normal)
+                slope, slope_onward = dot(d, surface.normal), dot(onward, surface.normal)
                 behind = slope * slope_onward > 0
-                behind &= hit.t * abs(slope) > abs(surface.offset - _dot(origin, surface.normal))
+                behind &= hit.t * abs(slope) > abs(surface.offset - dot(origin, surface.normal))
             if not behind:
                 raise UnboundedError
 
@@ -314,13 +223,13 @@ def _meet_sphere(
     index: int, sphere: HeldSphere, origin: Point, d: Point, dd: arb, leaving: int | None, window: _Window
 ) -> Iterator[Hit]:
     """The roots that may count, up to the first that surely does if the ray meets the sphere at all."""
-    p = _minus(origin, sphere.centre)
-    half = _dot(p, d)
+    p = minus(origin, sphere.centre)
+    half = dot(p, d)
     sure = True
     if index == leaving:
         roots = [-2 * half / dd]
     else:
-        constant = sphere.at_eye if leaving is None else _dot(p, p) - sphere.radius**2
+        constant = sphere.at_eye if leaving is None else dot(p, p) - sphere.radius**2
         squared = half * half - dd * constant
         if squared < 0:
             return
@@ -329,7 +238,7 @@ def _meet_sphere(
         roots = [(-half - root) / dd, (root - half) / dd]
     for t in roots:
         counts, clear = bool(t > window.least), bool(t > window.clear)
-        if counts or not t <= window.least:
+        if counts or not t < window.least:
             yield Hit(t, index, sure and clear, counts)
         if clear:
             return
@@ -341,28 +250,28 @@ def _meet_plane(
     """The crossing if it may count. Along a plane, what is farther than any bound, or a miss by the rule for ties."""
     if leaving is None and (plane.offset.is_zero() or plane.is_screen):
         return
-    side = plane.offset if leaving is None else plane.offset - _dot(origin, plane.normal)
-    facing = _dot(d, plane.normal)
+    side = plane.offset if leaving is None else plane.offset - dot(origin, plane.normal)
+    facing = dot(d, plane.normal)
     slope, missed = abs(facing), window.missed * plane.length
     if not missed.is_zero() and slope <= missed:
         return
     if facing > 0 or facing < 0:
         t = side / facing
         counts = bool(t > window.least)
-        if counts or not t <= window.least:
+        if counts or not t < window.least:
             yield Hit(t, index, bool(t > window.clear and (missed.is_zero() or slope > missed)), counts)
         return
-    farther = side.abs_lower() / facing.abs_upper()
+    farther = arb.pos_inf() if facing.is_zero() else side.abs_lower() / facing.abs_upper()
     yield Hit(farther, index, sure=False, ruled=False, bounded=False)
 
 
 def _sphere_blocks(sphere: HeldSphere, point: Point, to_light: Point, left: bool, start: arb) -> tuple[Verdict, bool]:
     """Whether dd t^2 + 2 half t + constant has a root in start < t < 1, by its signs; a double root counts."""
-    p, dd = _minus(point, sphere.centre), _dot(to_light, to_light)
-    half = _dot(p, to_light)
-    constant = ZERO if left else _dot(p, p) - sphere.radius**2
+    p, dd = minus(point, sphere.centre), dot(to_light, to_light)
+    half = dot(p, to_light)
+    constant = ZERO if left else dot(p, p) - sphere.radius**2
     if sphere.at_light.is_zero():  # one root is 1, so that the other is constant / dd
-        return _both(_positive(constant - start * dd), _positive(dd - constant)), False
+        return not left and _both(_positive(constant - start * dd), _positive(dd - constant)), False
     if left and start.is_zero():
         return _both(_positive(-half), _positive(sphere.at_light)), False
     slope, end_slope = half + dd * start, half + dd
@@ -387,67 +296,9 @@ def _both(one: Verdict, other: Verdict) -> Verdict:
 
 
 def _positive(value: arb) -> Verdict:
-    return True if value > 0 else False if value <= 0 else None
+    return True if value > 0 else False if value < 0 else None
 
 
 def _opposite(one: arb, other: arb) -> Verdict:
     """Whether two balls have opposite signs."""
     return _positive(-one * other)
-
-
-def _mirrored(d: Point, arm: Point, surface: HeldSphere | HeldPlane) -> Point:
-    """The mirrored direction d - 2 (d.n) n, as long as d: no term depends on the length."""
-    length = surface.radius if isinstance(surface, HeldSphere) else surface.length
-    return _along(d, -2 * _dot(d, arm) / length**2, arm)
-
-
-def _sphere(sphere: Sphere) -> HeldSphere:
-    centre, radius = [exact(value) for value in sphere.centre], exact(sphere.radius)
-    at_eye, at_light = (
-        _ball(sum((a - exact(b)) ** 2 for a, b in zip(centre, point, strict=True)) - radius**2)
-        for point in (EYE, LIGHT)
-    )
-    return HeldSphere(*_material(sphere), _point(centre), _ball(radius), at_eye, at_light)
-
-
-def _plane(plane: Plane) -> HeldPlane:
-    normal, point = [exact(value) for value in plane.normal], [exact(value) for value in plane.point]
-    offset, from_light = (
-        _ball(sum(n * (a - exact(b)) for n, a, b in zip(normal, point, origin, strict=True))) for origin in (EYE, LIGHT)
-    )
-    is_screen = not any(normal[:2]) and point[2] == exact(SCREEN_DISTANCE)
-    length = _ball(sum(n * n for n in normal)).sqrt()
-    return HeldPlane(*_material(plane), _point(normal), length, offset, from_light, is_screen)
-
-
-def _material(surface: Sphere | Plane) -> tuple[Point, arb, arb]:
-    return _point(map(exact, surface.colour)), _ball(exact(surface.diffuse)), _ball(exact(surface.reflection))
-
-
-def _ball(value: Fraction | float) -> arb:
-    fraction = value if isinstance(value, Fraction) else exact(value)
-    return arb(fmpq(fraction.numerator, fraction.denominator))
-
-
-def _point(values: Iterable[Fraction]) -> Point:
-    x, y, z = map(_ball, values)
-    return (x, y, z)
-
-
-def _rounded_point(point: Point) -> tuple[NDArray[np.float64], float]:
-    """In double precision, and the most that it is off."""
-    value = np.array([float(ball.mid()) for ball in point])
-    error = sum(float(ball.rad()) for ball in point)
-    return value, float(error + ROUNDING * np.abs(value).max())
-
-
-def _dot(a: Point, b: Point) -> arb:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _minus(a: Point, b: Point) -> Point:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-def _along(origin: Point, t: arb, d: Point) -> Point:
-    return (origin[0] + t * d[0], origin[1] + t * d[1], origin[2] + t * d[2])

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.proof import PROVEN, Colour, Prover
+from reference.rules import DOCUMENT_RULES, Rules
 from reference.scene import Triple
-from reference.walk import DOCUMENT_RULES, Rules
 from reports.metrics import TOLERANCE
 
 KNIFE_EDGE, DOCUMENT_WINDOW = "knife-edge", "document-window"

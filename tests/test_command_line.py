@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -16,8 +17,9 @@ from helpers import EXAMPLE, ROOT, Finished, crossray, exact, need, pixels_over
 from reference import Scene
 from reference.image import read_image, write_image
 from translator.registry import renderer_names
+from translator.renderers import mitsuba, povray
 
-COMMANDS = ("render", "export", "check", "compare", "doctor")
+COMMANDS = ("render", "export", "check", "compare", "explain", "certify", "doctor")
 SMALL = ("--size", "16x16")
 
 
@@ -88,6 +90,9 @@ def test_check_writes_reports_and_pictures(checked: tuple[Path, list[Finished]])
     (scene,) = content["scenes"]
     facts = {name: scene[name] for name in ("scene", "path", "width", "height", "depth", "convention")}
     assert list(facts.values()) == ["example1", str(EXAMPLE), 64, 64, 3, "exact"]
+    assert (scene["reference"]["renderer"], scene["reference"]["limits"]) == ("certified", {"precision": 0, "gap": 0})
+    limits = {comparison["renderer"]: comparison["limits"] for comparison in scene["comparisons"]}
+    assert limits == {"povray": asdict(povray.LIMITS), "mitsuba": asdict(mitsuba.LIMITS)}
     assert {comparison["verdict"] for comparison in scene["comparisons"]} == {"agree"}
     assert (out / "report.html").stat().st_size > 10_000
     assert ElementTree.parse(out / "junit.xml").getroot().tag == "testsuites"
@@ -116,6 +121,13 @@ def test_renderers_can_be_named_in_several_ways(tmp_path: Path) -> None:
             result = crossray("export", *order, "-o", folder)
             assert result.returncode == 0, (words, result.stderr)
             assert {path.name for path in folder.iterdir()} - {"native"} == {"povray", "mitsuba"}
+
+
+def test_check_compares_every_renderer_with_the_truth(tmp_path: Path) -> None:
+    assert crossray("check", EXAMPLE, *SMALL, "--out", tmp_path / "out").returncode == 0
+    assert [name for _, name in statuses(tmp_path / "out")] == renderer_names()
+    (scene,) = report(tmp_path / "out")["scenes"]
+    assert scene["reference"]["renderer"] == "certified"
 
 
 def test_check_takes_renderers_with_commas(tmp_path: Path) -> None:
@@ -172,10 +184,10 @@ def test_renderer_that_is_wrong_ends_with_1(fake_povray: tuple[str, Path], tmp_p
     script.write_text(f"exec {shutil.which('cp')} {tmp_path}/black.png scene.png\n", encoding="utf-8")
     result = crossray("check", EXAMPLE, *SMALL, "--out", tmp_path / "out", path=path)
     assert result.returncode == 1, result.stderr
-    assert "example1  povray  disagree: 256 of 256 pixels differ" in result.stdout
+    assert "example1  povray  disagree: 256 of 256 pixels unexplained; " in result.stdout
 
 
-FAILURES = {"crash": ("echo oh dear; exit 7", "exit code 7"), "endless": ("while :; do :; done", "out of time (1 s)")}
+FAILURES = {"crash": ("echo oh dear; exit 7", "exit code 7"), "endless": ("while :; do :; done", "out of time (4 s)")}
 
 
 @pytest.mark.parametrize("failure", FAILURES)
@@ -185,12 +197,12 @@ def test_renderer_that_fails_ends_with_3_and_the_rest_is_kept(
     path, script = fake_povray
     program, reason = FAILURES[failure]
     script.write_text(program, encoding="utf-8")
-    words = ("--timeout", "1") if failure == "endless" else ()
+    words = ("--timeout", "4") if failure == "endless" else ()
     result = crossray("check", EXAMPLE, *SMALL, "--with", "povray", *words, "--out", tmp_path / "out", path=path)
     assert result.returncode == 3, result.stderr
     assert "example1  povray  failed: " in result.stdout
     assert reason in result.stdout
-    assert (tmp_path / "out/images/example1/native.exr").is_file()
+    assert (tmp_path / "out/images/example1/certified.exr").is_file()
     assert reason in (tmp_path / "out/report.html").read_text(encoding="utf-8")
 
 
@@ -243,7 +255,7 @@ def test_compare(tmp_path: Path) -> None:
     reported = crossray("compare", "right.png", "other.png", "--out", "out", cwd=tmp_path)
     assert (reported.returncode, reported.stdout) == (1, wrong.stdout)
     (scene,) = report(tmp_path / "out")["scenes"]
-    assert scene["comparisons"][0]["worst"] == [{"column": 9, "row": 4, "error": 2}]
+    assert scene["comparisons"][0]["worst"] == [{"column": 9, "row": 4, "error": 2, "class": None, "evidence": None}]
     assert "right.png" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
 
 
@@ -316,7 +328,7 @@ def test_results_go_to_standard_output_and_messages_to_standard_error(tmp_path: 
         str(tmp_path / "out/report.html"),
     ]
     assert quiet.stderr == ""
-    assert "loud: native\nloud: mitsuba\n" in verbose.stderr
+    assert "loud: certified\nloud: mitsuba\nloud: comparing mitsuba\n" in verbose.stderr
 
 
 def test_examples_are_checked_when_no_scene_is_named(tmp_path: Path) -> None:

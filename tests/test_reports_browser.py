@@ -8,6 +8,8 @@ from helpers import need
 from playwright.sync_api import Browser, Dialog, Page, Request, sync_playwright
 from recorded import GREY, HEIGHT, NAME, WIDTH, facts, record, record_everything
 
+from reports.accounting import CLASSES
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -58,7 +60,7 @@ def test_every_picture_has_loaded(page: Page) -> None:
     sizes = page.eval_on_selector_all(
         "img.picture", "images => images.map(i => [i.complete, i.naturalWidth, i.naturalHeight])"
     )
-    assert sizes == [[True, WIDTH, HEIGHT]] * 17
+    assert sizes == [[True, WIDTH, HEIGHT]] * 22
     assert page.locator("script").count() == 1
     assert page.locator("img[src=x], pre *, b").count() == 0
 
@@ -66,25 +68,79 @@ def test_every_picture_has_loaded(page: Page) -> None:
 def test_overview_is_worst_first(page: Page) -> None:
     rows = page.locator("section[aria-labelledby=overview] tbody tr").all()
     cells = [[cell.strip() for cell in row.locator("th, td").all_inner_texts()[:3]] for row in rows]
-    assert cells.pop(8)[0:2] == ["", "Povray 1.2 <b>"]
+    assert cells.pop(8)[0:2] == ["", "Povray"]
     assert cells == [
-        [NAME, "Native 1.2 <b>", "reference"],
-        ["", "Mitsuba 1.2 <b>", "failed"],
-        ["", "Povray 1.2 <b>", "disagree"],
-        ["", "Mitsuba-Stock 1.2 <b>", "disagree"],
+        [NAME, "Native", "reference"],
+        ["", "Mitsuba", "failed"],
+        ["", "Povray", "disagree"],
+        ["", "Mitsuba-Stock", "disagree"],
         ["", "Tachyon", "not installed"],
-        ["", "Radiance 1.2 <b>", "unsupported"],
-        ["", "Cycles 1.2 <b>", "agree"],
-        ["lost", "Native 1.2 <b>", "failed"],
-        ["off", "Native 1.2 <b>", "reference"],
-        ["", "Povray 1.2 <b>", "disagree"],
-        ["slight", "Native 1.2 <b>", "reference"],
-        ["", "Povray 1.2 <b>", "disagree"],
-        ["fine", "Native 1.2 <b>", "reference"],
-        ["", "Povray 1.2 <b>", "agree"],
+        ["", "Radiance", "unsupported"],
+        ["", "Cycles", "agree"],
+        ["lost", "Native", "failed"],
+        ["off", "Native", "reference"],
+        ["", "Povray", "disagree"],
+        ["edges", "Native", "reference"],
+        ["", "Mitsuba", "disagree"],
+        ["", "Povray", "agree"],
+        ["slight", "Native", "reference"],
+        ["", "Povray", "disagree"],
+        ["fine", "Native", "reference"],
+        ["", "Povray", "agree"],
     ]
     headings = page.locator("section.scene h2").all_inner_texts()
-    assert headings == [NAME, "lost", "off", "slight", "fine"]
+    assert headings == [NAME, "lost", "off", "edges", "slight", "fine"]
+
+
+def test_explained_pixels_have_columns_of_their_own(page: Page) -> None:
+    table = page.locator("section[aria-labelledby=overview] table")
+    headings = table.locator("thead tr").first.locator("th").all_inner_texts()
+    assert headings[3:5] == ["Unexplained", "Explained"]
+    rows = table.locator("tbody:has(a:text-is('edges')) tr").all()
+    cells = [[cell.strip() for cell in row.locator("th, td").all_inner_texts()[3:8]] for row in rows[1:]]
+    assert cells == [
+        ["1", "3 knife-edge, 1 document-window", "5", "5", "5"],
+        ["0", "3 knife-edge, 1 document-window", "4", "4", "4"],
+    ]
+    assert rows[0].locator("td.why").inner_text() == "native <b>in short</b>"
+    widths = {sum(cell.evaluate("cell => cell.colSpan") for cell in row.locator("th, td").all()) for row in rows}
+    assert len(widths) == 1
+    meaning = rows[1].locator(".class").first.get_attribute("title")
+    assert meaning == CLASSES["knife-edge"]
+
+
+def test_every_differing_pixel_is_listed_with_why(page: Page) -> None:
+    scene = page.locator("section.scene", has=page.get_by_role("heading", name="edges"))
+    listed = scene.locator("details", has_text="Mitsuba: pixels that differ")
+    listed.locator("summary").click()
+    assert listed.locator("thead th").all_inner_texts() == ["Column", "Row", "Error in levels", "Why"]
+    rows = [row.locator("td").all_inner_texts() for row in listed.locator("tbody tr").all()]
+    assert rows == [
+        ["90", "30", "20", "unexplained"],
+        ["72", "76", "93.56", "document-window: the colour by the document's text"],
+        *([str(column), "72", "35.86", "knife-edge: one of 2 admissible colours"] for column in (3, 20, 50)),
+    ]
+    for picture, (unexplained, explained) in enumerate([(1, 4), (0, 4)]):
+        circles = scene.locator("svg").nth(picture).locator("circle")
+        assert (circles.count(), circles.locator("xpath=self::*[@class='explained']").count()) == (
+            unexplained + explained,
+            explained,
+        )
+        caption = scene.locator("figcaption", has_text="Difference").nth(picture).inner_text()
+        assert f"red: {unexplained} unexplained, amber: explained" in caption
+
+
+def test_versions_are_under_the_pictures(page: Page) -> None:
+    captions = page.locator("section.scene").first.locator("figcaption:has(strong)").all_inner_texts()
+    assert captions == [
+        "Native 1.2 <b> · reference",
+        "Mitsuba 1.2 <b> · failed",
+        "Povray 1.2 <b> · disagree",
+        "Mitsuba-Stock 1.2 <b> · disagree",
+        "Tachyon not installed",
+        "Radiance 1.2 <b> · unsupported",
+        "Cycles 1.2 <b> · agree",
+    ]
 
 
 def test_what_was_not_compared_is_not_said_to_agree(page: Page) -> None:

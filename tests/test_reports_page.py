@@ -9,9 +9,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from recorded import GREY, HEIGHT, NAME, WIDTH, altered, facts, record, record_everything
+from markupsafe import escape
+from recorded import EDGE, GREY, HEIGHT, NAME, NEAR, WIDTH, altered, facts, record, record_everything
 
 from reference.image import read_image
+from reports.accounting import CLASSES
+from reports.terminal import summary_lines
 from reports.writing import write_reports
 
 REPORTS = ("report.html", "report.json", "junit.xml")
@@ -34,7 +37,7 @@ def report(folder: Path) -> dict[str, Any]:
 def test_report_has_the_names_of_the_contract(report: dict[str, Any]) -> None:
     assert report["version"] == 1
     assert {"crossray", "started", "environment", "scenes"} <= set(report)
-    assert [scene["scene"] for scene in report["scenes"]] == ["fine", "slight", "off", NAME, "lost"]
+    assert [scene["scene"] for scene in report["scenes"]] == ["fine", "slight", "off", NAME, "lost", "edges"]
     for scene in report["scenes"]:
         assert {"scene", "path", "width", "height", "depth", "convention", "seconds", "comparisons"} <= set(scene)
         for comparison in scene["comparisons"]:
@@ -60,6 +63,8 @@ def test_verdicts_and_pixels(report: dict[str, Any]) -> None:
         (NAME, "cycles"): 0,
         (NAME, "povray"): 2,
         (NAME, "mitsuba-stock"): 1,
+        ("edges", "mitsuba"): 1,
+        ("edges", "povray"): 0,
     }
     for verdict, pixels in rendered.values():
         assert verdict == ("disagree" if pixels["unexplained"] else "agree")
@@ -74,14 +79,56 @@ def test_verdicts_and_pixels(report: dict[str, Any]) -> None:
 def test_pixels_that_differ_are_listed_largest_error_first(report: dict[str, Any]) -> None:
     comparison = next(c for c in report["scenes"][3]["comparisons"] if c["renderer"] == "povray")
     assert comparison["worst"] == [
-        {"column": 110, "row": 60, "error": 100},
-        {"column": 3, "row": 2, "error": 50},
+        {"column": 110, "row": 60, "error": 100, "class": None, "evidence": None},
+        {"column": 3, "row": 2, "error": 50, "class": None, "evidence": None},
     ]
+
+
+EXPLAINED = {"knife-edge": 3, "document-window": 1}
+
+
+def compared(report: dict[str, Any], renderer: str) -> dict[str, Any]:
+    """That renderer's comparison on the scene with explained pixels."""
+    (scene,) = [scene for scene in report["scenes"] if scene["scene"] == "edges"]
+    (comparison,) = [comparison for comparison in scene["comparisons"] if comparison["renderer"] == renderer]
+    found: dict[str, Any] = comparison
+    return found
+
+
+def test_explained_pixels_agree_and_are_counted_by_class(report: dict[str, Any]) -> None:
+    agreeing, wrong = compared(report, "povray"), compared(report, "mitsuba")
+    agree = WIDTH * HEIGHT - 4
+    assert agreeing["pixels"] == {"total": WIDTH * HEIGHT, "agree": agree, "explained": EXPLAINED, "unexplained": 0}
+    assert wrong["pixels"] == {"total": WIDTH * HEIGHT, "agree": agree - 1, "explained": EXPLAINED, "unexplained": 1}
+    assert (agreeing["verdict"], wrong["verdict"]) == ("agree", "disagree")
+    assert (agreeing["over"]["0.5"], wrong["over"]["0.5"]) == (4, 5)
+
+
+def test_explained_pixels_are_listed_with_their_evidence_after_the_others(report: dict[str, Any]) -> None:
+    found = [
+        (pixel["column"], pixel["row"], pixel["class"], pixel["evidence"])
+        for pixel in compared(report, "mitsuba")["worst"]
+    ]
+    assert found == [
+        (90, 30, None, None),
+        (*NEAR, "document-window", "the colour by the document's text"),
+        *((column, EDGE, "knife-edge", "one of 2 admissible colours") for column in (3, 20, 50)),
+    ]
+
+
+def test_terminal_lines_count_explained_pixels(report: dict[str, Any]) -> None:
+    lines = [line for line in summary_lines(report) if line.startswith("edges")]
+    explained = "3 knife-edge, 1 document-window; largest error 93.6 levels"
+    assert lines == [
+        f"edges  mitsuba  disagree: 1 of 9600 pixels unexplained, {explained}",
+        f"edges  povray  agree: 0 of 9600 pixels unexplained, {explained}",
+    ]
+    assert "off  povray  disagree: 2 of 9600 pixels unexplained; largest error 1 levels" in summary_lines(report)
 
 
 def test_junit(folder: Path) -> None:
     suites = {suite.get("name"): suite for suite in ElementTree.parse(folder / "junit.xml").getroot()}
-    assert list(suites) == ["fine", "slight", "off", NAME, "lost"]
+    assert list(suites) == ["fine", "slight", "off", NAME, "lost", "edges"]
     for suite in suites.values():
         cases = suite.findall("testcase")
         assert suite.get("tests") == str(len(cases))
@@ -97,6 +144,19 @@ def test_junit(folder: Path) -> None:
         "mitsuba-stock": ["failure"],
         "mitsuba": ["error"],
     }
+    kinds = {case.get("name"): [child.tag for child in case] for case in suites["edges"]}
+    assert kinds == {"native": [], "mitsuba": ["properties", "failure"], "povray": ["properties"]}
+
+
+def test_junit_counts_explained_pixels(folder: Path) -> None:
+    root = ElementTree.parse(folder / "junit.xml").getroot()
+    for renderer in ("mitsuba", "povray"):
+        properties = root.findall(f"testsuite[@name='edges']/testcase[@name='{renderer}']/properties/property")
+        counts = {item.get("name"): item.get("value") for item in properties}
+        assert counts == {"knife-edge": "3", "document-window": "1"}
+    assert len(root.findall(".//properties")) == 2
+    (failure,) = root.findall("testsuite[@name='edges']/testcase/failure")
+    assert failure.get("message") == "1 of 9600 pixels differ and are not explained"
 
 
 def test_what_was_not_compared_has_not_passed(folder: Path) -> None:
@@ -138,11 +198,18 @@ def test_page_needs_nothing_else_and_nothing_is_injected(folder: Path) -> None:
     assert "{{ 7 * 7 }}" in text
 
 
+def test_page_says_what_each_class_is_and_how_many_pixels_it_has(folder: Path) -> None:
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    for kind, meaning in CLASSES.items():
+        assert f"<dt>{kind}</dt><dd>{escape(meaning)}</dd>" in text
+    assert "3 of 8 comparisons agree; of 76,800 pixels 8 differ for a reason that is proven, 7 for none." in text
+
+
 def test_pictures_that_are_no_numbers_show_in_the_difference(tmp_path: Path) -> None:
     broken = altered((30, 20, np.nan))
     record(tmp_path, {"nan.txt": [(facts("native"), GREY), (facts("povray"), broken)]})
     comparison = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["scenes"][0]["comparisons"][0]
-    assert comparison["worst"] == [{"column": 30, "row": 20, "error": 255}]
+    assert comparison["worst"] == [{"column": 30, "row": 20, "error": 255, "class": None, "evidence": None}]
     assert read_image(tmp_path / f"{comparison['difference']}.png")[20, 30].min() == 255
 
 

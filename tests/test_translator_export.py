@@ -31,6 +31,7 @@ NUMBER = re.compile(r"(?<![\w.])-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?(?![\w.])")
 pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
 PURE = """
 import json, os, sys
+from dataclasses import asdict
 from reference.text import parse
 from translator.contract import Settings
 from translator.registry import adapter, renderer_names
@@ -50,8 +51,8 @@ def watch(event, arguments):
 scene = parse(sys.stdin.read())
 adapters = {name: adapter(name) for name in renderer_names()}
 sys.addaudithook(watch)
-exports = {name: vars(renderer.export(scene, Settings(64, 48, 3))) for name, renderer in adapters.items()}
-again = {name: vars(renderer.export(scene, Settings(64, 48, 3))) for name, renderer in adapters.items()}
+exports = {name: asdict(renderer.export(scene, Settings(64, 48, 3))) for name, renderer in adapters.items()}
+again = {name: asdict(renderer.export(scene, Settings(64, 48, 3))) for name, renderer in adapters.items()}
 assert not touched, touched
 assert exports == again
 assert not {"mitsuba", "drjit"} & set(sys.modules)

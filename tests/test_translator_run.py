@@ -16,7 +16,7 @@ import translator.run
 from reference import Scene
 from reference.image import Picture, write_image
 from reference.text import parse
-from translator.contract import PYTHON, Export, Settings, Unsupported
+from translator.contract import PYTHON, Export, Limits, Settings, Unsupported
 from translator.run import Outcome, installed_version, run_renderer
 
 SETTINGS = Settings(8, 6)
@@ -60,13 +60,15 @@ def draw(fresh_versions: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, 
             if refusal:
                 raise Unsupported(refusal)
             files = {"program.py": start + program, "textures/list.txt": "é\n"}
-            return Export(files, (PYTHON, "program.py", "two words"), image, ("a note",), environment or {})
+            command = (PYTHON, "program.py", "two words")
+            return Export(files, command, image, ("a note",), environment or {}, Limits(2.0**-10, 0.5))
 
         fake = SimpleNamespace(
             TITLE="The Fake",
             INSTALL="get fake",
             VERSION=(version, r"Fake (\S+)"),
             TIMING=r"traced in ([0-9.]+) s",
+            SUMMARY=r"in short: .*",
             export=export,
         )
         monkeypatch.setattr(translator.run, "adapter", lambda name: fake)
@@ -105,8 +107,14 @@ def test_rendered(draw: Draw, levels: Picture) -> None:
     assert outcome.command == f"{sys.executable} program.py 'two words'"
     assert outcome.log == "traced in 0.25 s\n"
     assert outcome.notes == ("a note",)
+    assert outcome.limits == {"precision": 2.0**-10, "gap": 0.5}
+    assert outcome.summary is None
     assert outcome.picture is not None
     np.testing.assert_allclose(outcome.picture, levels, rtol=1e-6)
+
+
+def test_summary_is_what_the_log_says_in_short(draw: Draw) -> None:
+    assert draw(COPY + "print('at length')\nprint('in short: fine')\nprint('at length')").summary == "in short: fine"
 
 
 def test_unsupported(draw: Draw) -> None:

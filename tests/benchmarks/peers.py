@@ -4,8 +4,7 @@
 
 Tracing: the tracer's own time for 1000 x 1000 pixels and three bounces, in double precision, with a warm kernel, up to
 the picture in memory; for the others the time that they report themselves. Proving: every pixel, in the same process.
-Whole process: from the command to the
-picture on disk, for crossray with a warm kernel cache.
+Whole process: from the command to the picture on disk, for crossray with a warm kernel cache.
 """
 
 from __future__ import annotations
