@@ -352,6 +352,8 @@ def certify(
 
     for path in filter(None, (output, mask)):
         check_format(path)
+    if mask and (mask.suffix.lower() != ".png" or mask == output):
+        raise InputError(f"{mask}: expected another name ending in .png for the mask")
     loaded = _load(scene, quiet)
     start = perf_counter()
     with progress_bar(quiet, verbose, 100) as advance:

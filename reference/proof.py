@@ -19,7 +19,7 @@ from reference.walk import Ray, UnboundedError, UndecidedError, Walk
 
 PRECISIONS = (128, 512, 2048)  # bits; both sides of an undecided branch are followed only at the last one
 PROVEN = 1e-6  # levels (for a channel over 255, of 255ths of it): the largest radius of a proven colour
-LARGEST_SET = 100  # colours of one pixel; a larger set says nothing
+LARGEST_SET = 100  # ways that are followed; the colours of more than that would say nothing
 
 
 class Colour(NamedTuple):
@@ -85,8 +85,9 @@ class Prover:
                     sharp = rules.has_leeway or _is_sharp(colour)
                     if not (sharp or last):
                         raise UndecidedError
-                    complete &= sharp
-                    if all(map(math.isfinite, colour.value)) and not any(_covers(other, colour) for other in found):
+                    finite = all(map(math.isfinite, colour.value))
+                    complete &= sharp and finite
+                    if finite and not any(_covers(other, colour) for other in found):
                         found.append(colour)
                 rays = rays or walk.rays
                 path = walk.next_path()

@@ -261,7 +261,9 @@ def _meet_plane(
         if counts or not t < window.least:
             yield Hit(t, index, bool(t > window.clear and (missed.is_zero() or slope > missed)), counts)
         return
-    farther = arb.pos_inf() if facing.is_zero() else side.abs_lower() / facing.abs_upper()
+    farther = side.abs_lower()
+    if farther > 0:
+        farther = arb.pos_inf() if facing.is_zero() else farther / facing.abs_upper()
     yield Hit(farther, index, sure=False, ruled=False, bounded=False)
 
 

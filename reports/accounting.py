@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.proof import PROVEN, Colour, Prover
+from reference.proof import Admissible, Colour, Prover
 from reference.rules import DOCUMENT_RULES, Rules
 from reference.scene import Triple
 from reports.metrics import TOLERANCE
@@ -62,7 +62,7 @@ def explain_pixel(prover: Prover, limits: Mapping[str, float], column: int, row:
     if not truth.proven and any(_holds(colour, value) for colour in truth.colours):
         number = f"{len(truth.colours)}" if truth.complete else f"at least {len(truth.colours)}"
         return Reason(KNIFE_EDGE, f"one of {number} admissible colours")
-    if any(_holds(colour, value) for colour in prover.admissible(column, row, DOCUMENT_RULES).colours):
+    if _explains(prover.admissible(column, row, DOCUMENT_RULES), truth, value):
         return Reason(DOCUMENT_WINDOW, "the colour by the document's text")
     precision, gap = limits.get("precision", 0.0), limits.get("gap", 0.0)
     for kind, width in ((PRECISION, 0.0), (LIMIT, gap)):
@@ -71,7 +71,7 @@ def explain_pixel(prover: Prover, limits: Mapping[str, float], column: int, row:
             continue
         for step in (0.0, *STEPS) if width else STEPS:
             rules = Rules(precision=precision * step, gap=width)
-            if _is_other_side(prover, column, row, rules, value, truth.colours):
+            if _explains(prover.admissible(column, row, rules), truth, value):
                 return Reason(kind, _evidence(rules))
     return None
 
@@ -82,22 +82,20 @@ def _may_hold(prover: Prover, column: int, row: int, rules: Rules, value: Triple
     return not found.complete or (len(found.colours) > 1 and any(_holds(colour, value) for colour in found.colours))
 
 
-def _is_other_side(
-    prover: Prover, column: int, row: int, rules: Rules, value: Triple, truth: tuple[Colour, ...]
-) -> bool:
-    """Whether the value is a sharp colour of another branch than the truth's."""
-    others = [
-        colour
-        for colour in prover.admissible(column, row, rules).colours
-        if max(colour.radius) <= WEAK and not any(_holds(colour, right.value, PROVEN) for right in truth)
-    ]
-    return any(_holds(colour, value) for colour in others)
+def _explains(other: Admissible, truth: Admissible, value: Triple) -> bool:
+    """Whether the value is a sharp colour of a branch that does not agree with the truth."""
+    return any(
+        max(colour.radius) <= WEAK
+        and _holds(colour, value)
+        and not any(_holds(colour, right.value) for right in truth.colours)
+        for colour in other.colours
+    )
 
 
-def _holds(colour: Colour, value: Triple, tolerance: float = TOLERANCE) -> bool:
-    """Whether each channel of the value, clamped, is within the colour's ball, widened by `tolerance` levels."""
+def _holds(colour: Colour, value: Triple) -> bool:
+    """Whether each channel of the value, clamped, is within the colour's ball, widened by what agrees."""
     return all(
-        _clamped(centre - radius) - tolerance <= _clamped(found) <= _clamped(centre + radius) + tolerance
+        _clamped(centre - radius) - TOLERANCE <= _clamped(found) <= _clamped(centre + radius) + TOLERANCE
         for centre, radius, found in zip(colour.value, colour.radius, value, strict=True)
     )
 

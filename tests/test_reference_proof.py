@@ -346,6 +346,24 @@ def test_parallel_mirrors_at_their_horizon_are_undecided(reflection: tuple[float
     assert found.colours[0].value == BLACK
 
 
+def test_a_ray_that_starts_in_a_plane_and_runs_along_it_is_undecided() -> None:
+    """Rounded, it may meet the plane anywhere."""
+    through_eye, mirror = Plane(BLUE, (0, 0, 0), (0, 1, 0), 0.5, 0), Plane(RED, (0, 0, 300), (0, 0, -1), 0, 0.5)
+    assert not prove(scene(through_eye, mirror)).complete
+
+
+def test_a_ray_that_starts_in_a_plane_and_runs_along_it_rounded_is_undecided() -> None:
+    through_eye, mirror = Plane(BLUE, (0, 0, 0), (0, 3, -1), 0.5, 0), Plane(RED, (0, 0, 300), (0, 1, 3), 0, 0.5)
+    assert not prove(scene(through_eye, mirror), height=3).complete
+
+
+def test_a_way_that_may_have_any_colour_is_undecided() -> None:
+    """Balls that are as wide as this leeway makes them hold everything after some bounces."""
+    example = Scene.load(ROOT / "scenes" / "example1.txt")
+    found = Prover(example, width=60, height=60).admissible(15, 48, Rules(precision=1e-6))
+    assert found.colours or not found.complete
+
+
 def test_more_colours_than_can_be_followed_are_undecided() -> None:
     """Planes of all colours through one edge."""
     planes = [Plane((number, 0, 0), (0, -125, 600), (0, number, 1), 0, 0) for number in range(2, LARGEST_SET + 3)]
