@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 DONE, DISAGREES, BAD_INPUT, NOT_DONE, SIGNALLED = 0, 1, 2, 3, 128
 SHOWN_WARNINGS = 20
 TIMED_RUNS = 5
+SHORTEST_PROOF = 600.0  # seconds that proving a picture may take, whatever renderers may
 
 app = typer.Typer(
     add_completion=False,
@@ -183,9 +184,10 @@ def export(
     import shlex
 
     from translator.contract import Unsupported
-    from translator.registry import adapter, renderer_names
+    from translator.registry import adapter, check_names, renderer_names
     from translator.run import command_line, write_export
 
+    check_names(_split(to))
     loaded, settings = _load(scene, quiet), _settings(size, depth)
     adapters = {name: adapter(name) for name in _split(to) or renderer_names()[1:]}
     refused = 0
@@ -229,13 +231,12 @@ def check(
     from reports.recording import Recording
     from reports.terminal import progress_bar, summary_lines
     from reports.writing import write_reports
-    from translator.registry import TRUTH, adapter, renderer_names
+    from translator.registry import TRUTH, check_names, renderer_names
     from translator.run import run_renderer
 
     required = _split(renderers)
     names = required or renderer_names()
-    for name in names:
-        adapter(name)
+    check_names(names)
     loaded = [(path, _load(path, quiet)) for path in scenes or _examples()]
     settings = _settings(size, depth)
     run = Recording(out, _version())
@@ -244,7 +245,8 @@ def check(
             entry = run.add_scene(path, size.width, size.height, depth=depth, convention="exact", text=dump(scene))
             for name in (TRUTH, *names):
                 advance(f"{entry['scene']}: {name}")
-                outcome = run_renderer(name, scene, settings, timeout)
+                limit = max(timeout, SHORTEST_PROOF) if name == TRUTH else timeout
+                outcome = run_renderer(name, scene, settings, limit)
                 facts = {key: value for key, value in vars(outcome).items() if key != "picture"}
                 run.add_picture(entry, facts, outcome.picture)
         results = write_reports(out, advance)

@@ -14,7 +14,7 @@ from reference.sweep import sweep
 from reference.tracer import check_request
 
 UNDECIDED, KNIFE_EDGE, CERTAIN = 0, 128, 255
-WORK = 200_000_000  # pixels times surfaces that are proven one by one; what is left then stays undecided
+WORK = 800_000_000  # pixels times surfaces times rays that are proven one by one; what is left then stays undecided
 STEPS = 100  # of the progress
 
 
@@ -58,7 +58,7 @@ def certify(
     edges = {}
     left = np.argwhere(~proven)
     step = -(-len(left) // STEPS) or 1
-    for done, (row, column) in enumerate(left[: WORK // max(1, prover.surfaces)].tolist()):
+    for done, (row, column) in enumerate(left[: WORK // (max(1, prover.surfaces) * (depth + 1))].tolist()):
         if done % step == 0:
             progress(f"proving pixel {done} of {len(left)}")
         found = prover.admissible(column, row)

@@ -33,12 +33,14 @@ class Colour(NamedTuple):
 class Admissible:
     """All colours that a pixel may have, first the one that the model's rule for ties gives.
 
-    `complete` is False where there are more than could be followed; `bits` is the precision that it took.
+    `complete` is False where there are more than could be followed; `exhausted` is True where that is for want of
+    precision or because there were too many ways. `bits` is the precision that it took.
     """
 
     colours: tuple[Colour, ...]
     complete: bool
     bits: int
+    exhausted: bool = False
     rays: tuple[Ray, ...] = field(default=(), compare=False, repr=False)  # of the first colour
 
     @property
@@ -71,7 +73,7 @@ class Prover:
         """Every path through the choices, depth first; raises UndecidedError unless this is the last precision."""
         found: list[Colour] = []
         rays: list[Ray] = []
-        complete = True
+        complete, exhausted = True, False
         path: list[int] | None = []
         with precision(bits):
             tables = self._tables[bits] = self._tables.get(bits) or Tables(self.scene)
@@ -86,14 +88,15 @@ class Prover:
                     if not (sharp or last):
                         raise UndecidedError
                     finite = all(map(math.isfinite, colour.value))
-                    complete &= sharp and finite
+                    exhausted |= not (sharp and finite)
                     if finite and not any(_covers(other, colour) for other in found):
                         found.append(colour)
                 rays = rays or walk.rays
                 path = walk.next_path()
                 if path is None:
                     break
-        return Admissible(tuple(found), complete and path is None, bits, tuple(rays))
+        exhausted |= path is not None
+        return Admissible(tuple(found), complete and not exhausted, bits, exhausted, tuple(rays))
 
     def _direction(self, column: int, row: int) -> Point:
         x = fmpq((2 * column + 1 - self.width) * int(SCREEN), self.width)

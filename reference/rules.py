@@ -12,7 +12,7 @@ class Rules:
     `shadow`: blockers count from this share of the way to the light. `reflection`: what mirrors show counts from this
     distance. `grazing`: planes with |d.n| up to this are missed. The others are leeway, within which every outcome is
     admissible: `precision`: relative error of each point and direction. `gap`: what is nearer than this to the start
-    of a secondary ray may count or not.
+    of a secondary ray may count or not. `far`, unless 0: what is met at this distance or farther may be missed.
     """
 
     shadow: float = 0.0
@@ -20,11 +20,12 @@ class Rules:
     grazing: float = 0.0
     precision: float = 0.0
     gap: float = 0.0
+    far: float = 0.0
 
     @property
     def has_leeway(self) -> bool:
         """Whether a pixel's colours are ranges."""
-        return bool(self.precision or self.gap)
+        return bool(self.precision or self.gap or self.far)
 
 
 EXACT_RULES = Rules()

@@ -121,6 +121,9 @@ class Walk:
                 hits += _meet_sphere(index, surface, origin, d, dd, leaving, window)
             elif index != leaving:
                 hits += _meet_plane(index, surface, origin, d, leaving, window)
+        if self.rules.far:
+            seen = arb(self.rules.far) / dd.sqrt()
+            hits = [hit if hit.t < seen else hit._replace(sure=False) for hit in hits]
         sure = [hit for hit in hits if hit.sure]
         if not sure:
             return _choose_hit(self, [*hits, None])

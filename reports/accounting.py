@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,9 +21,10 @@ CLASSES = {
     KNIFE_EDGE: "No precision can decide the pixel, and this is one of the colours that it may have.",
     DOCUMENT_WINDOW: "The colour by the document's text, whose smallest distance is 1e-4 where the truth has none.",
     PRECISION: "Closer to a branch than the renderer's precision can tell, and the colour on the other side of it.",
-    LIMIT: "The colour without what is closer to the start of a ray than the renderer can see.",
+    LIMIT: "The colour without what is closer to the start of a ray, or farther, than the renderer can see.",
 }
 STEPS = (2.0**-8, 2.0**-4, 1.0)  # of the declared precision: the smallest that explains a pixel is named
+CLOSE = 0.1  # levels: how near a renderer must come to the colour of another branch
 WEAK = 0.5  # levels: a colour that leeway makes wider than this is no evidence
 GIVE_UP = 16_000  # unexplained pixels times surfaces; what is left then is not examined
 
@@ -39,9 +41,9 @@ def account(
 ) -> list[Reason | None]:
     """A reason for each of `places` (row, column) of a picture in levels, None for those that are unexplained.
 
-    `limits` are what the renderer declared: `precision`, the relative error of its points and directions, and `gap`,
-    the distance from the start of a ray within which it may miss things. After very many unexplained pixels the rest
-    counts as unexplained too.
+    `limits` are what the renderer declared: `precision`, the relative error of its points and directions; `gap` and
+    `far`, the distances from the start of a ray up to which and from which on it may miss things. After very many
+    unexplained pixels the rest counts as unexplained too.
     """
     most = max(50, GIVE_UP // max(1, prover.surfaces))
     reasons: list[Reason | None] = []
@@ -59,19 +61,19 @@ def explain_pixel(prover: Prover, limits: Mapping[str, float], column: int, row:
     if not all(map(math.isfinite, value)):
         return None
     truth = prover.admissible(column, row)
-    if not truth.proven and any(_holds(colour, value) for colour in truth.colours):
+    if not truth.proven and not truth.exhausted and any(_holds(colour, value) for colour in truth.colours):
         number = f"{len(truth.colours)}" if truth.complete else f"at least {len(truth.colours)}"
         return Reason(KNIFE_EDGE, f"one of {number} admissible colours")
-    if _explains(prover.admissible(column, row, DOCUMENT_RULES), truth, value):
+    if _explains(prover.admissible(column, row, DOCUMENT_RULES), truth, value, TOLERANCE):
         return Reason(DOCUMENT_WINDOW, "the colour by the document's text")
-    precision, gap = limits.get("precision", 0.0), limits.get("gap", 0.0)
-    for kind, width in ((PRECISION, 0.0), (LIMIT, gap)):
-        widest = Rules(precision=precision, gap=width)
-        if not widest.has_leeway or not _may_hold(prover, column, row, widest, value):
+    precision, gap, far = (limits.get(name, 0.0) for name in ("precision", "gap", "far"))
+    for kind, sight in ((PRECISION, Rules()), (LIMIT, Rules(gap=gap, far=far))):
+        widest = replace(sight, precision=precision)
+        if (kind == LIMIT and not sight.has_leeway) or not _may_hold(prover, column, row, widest, value):
             continue
-        for step in (0.0, *STEPS) if width else STEPS:
-            rules = Rules(precision=precision * step, gap=width)
-            if _explains(prover.admissible(column, row, rules), truth, value):
+        for step in (0.0, *STEPS) if sight.has_leeway else STEPS:
+            rules = replace(sight, precision=precision * step)
+            if _explains(prover.admissible(column, row, rules), truth, value, CLOSE):
                 return Reason(kind, _evidence(rules))
     return None
 
@@ -82,20 +84,20 @@ def _may_hold(prover: Prover, column: int, row: int, rules: Rules, value: Triple
     return not found.complete or (len(found.colours) > 1 and any(_holds(colour, value) for colour in found.colours))
 
 
-def _explains(other: Admissible, truth: Admissible, value: Triple) -> bool:
+def _explains(other: Admissible, truth: Admissible, value: Triple, tolerance: float) -> bool:
     """Whether the value is a sharp colour of a branch that does not agree with the truth."""
     return any(
         max(colour.radius) <= WEAK
-        and _holds(colour, value)
+        and _holds(colour, value, tolerance)
         and not any(_holds(colour, right.value) for right in truth.colours)
         for colour in other.colours
     )
 
 
-def _holds(colour: Colour, value: Triple) -> bool:
-    """Whether each channel of the value, clamped, is within the colour's ball, widened by what agrees."""
+def _holds(colour: Colour, value: Triple, tolerance: float = TOLERANCE) -> bool:
+    """Whether each channel of the value, clamped, is within the colour's ball, widened by `tolerance` levels."""
     return all(
-        _clamped(centre - radius) - TOLERANCE <= _clamped(found) <= _clamped(centre + radius) + TOLERANCE
+        _clamped(centre - radius) - tolerance <= _clamped(found) <= _clamped(centre + radius) + tolerance
         for centre, radius, found in zip(colour.value, colour.radius, value, strict=True)
     )
 
@@ -105,6 +107,8 @@ def _clamped(level: float) -> float:
 
 
 def _evidence(rules: Rules) -> str:
-    parts = [f"missing what is nearer than {rules.gap:g} to the start of a ray"] if rules.gap else []
+    sight = [f"nearer than {rules.gap:g} to the start of a ray"] if rules.gap else []
+    sight += [f"farther than {rules.far:g} from it"] if rules.far else []
+    parts = [f"missing what is {' or '.join(sight)}"] if sight else []
     parts += [f"an error of 2^{math.log2(rules.precision):g} of the coordinates"] if rules.precision else []
     return f"the other side of a branch, reached by {' and '.join(parts)}"

@@ -40,11 +40,13 @@ class Limits:
     """What the renderer's arithmetic cannot do better, in the assignment's units, for this scene.
 
     `precision`: the relative error that its points and directions may have. `gap`: how far from its start a shadow or
-    mirrored ray may miss things, where the renderer starts its rays a little ahead.
+    mirrored ray may miss things, where the renderer starts its rays a little ahead. `far`: the distance from which on
+    rays may miss things, 0 for none.
     """
 
     precision: float = 0.0
     gap: float = 0.0
+    far: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,15 @@ def renderer_names() -> list[str]:
     return sorted((name for name in names if name != TRUTH), key=lambda name: (name != NATIVE, name))
 
 
+def check_names(names: list[str]) -> None:
+    """Raise InputError for a name that is no renderer's."""
+    for name in names:
+        if name not in renderer_names():
+            raise InputError(f"expected a renderer ({', '.join(renderer_names())}), found {name!r}")
+
+
 def adapter(name: str) -> Adapter:
     """The adapter of that name. Raises InputError for one that does not exist."""
-    if name not in (TRUTH, *renderer_names()):
-        raise InputError(f"expected a renderer ({', '.join(renderer_names())}), found {name!r}")
+    if name != TRUTH:
+        check_names([name])
     return cast(Adapter, import_module(f"translator.renderers.{name.replace('-', '_')}"))

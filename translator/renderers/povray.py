@@ -24,9 +24,9 @@ VERSION = (("povray", "--version"), r"POV-Ray (\d[\w.]*)")
 TIMING = r"Trace Time:.*\(([0-9.]+) seconds\)"
 
 UNIT = 0.1  # POV-Ray's tolerances are absolute (1e-4 for reflections, 1e-3 for shadows) and suit this scale
-LIMITS = Limits(precision=2.0**-20, gap=1e-3 / UNIT)
 DEEPEST = 255  # bounces: max_trace_level stops at 256
 FARTHEST = 1e7 / UNIT  # POV-Ray ignores hits beyond 1e7 of its units
+LIMITS = Limits(precision=2.0**-36, gap=1e-3 / UNIT, far=FARTHEST)
 FARTHEST_PLANE = 1e5  # of a plane: slanting rays meet it much farther away
 LIGHT_GAP = 1e-6  # between a sphere and the light
 

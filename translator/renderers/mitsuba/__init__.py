@@ -26,9 +26,10 @@ INSTALL = "pip install mitsuba"
 VERSION = ((PYTHON, "-c", "import importlib.metadata as m; print('mitsuba', m.version('mitsuba'))"), r"mitsuba (\S+)")
 TIMING = r"traced in ([0-9.e-]+) s"
 
-LIMITS = Limits(precision=2.0**-20, gap=0.1)  # single precision; rays start ahead by 1e-4 of the way to the light
 MIRROR_SHARE = 1 - 2.0**-23  # of the blended BSDF: the rest is the smallest share that float32 keeps apart
 PLANE_RADIUS = 1e9  # a plane is a disk of this radius
+# Single precision, as it adds up in interval arithmetic; rays start ahead by 1e-4 of the way to the light.
+LIMITS = Limits(precision=2.0**-20, gap=0.1, far=0.9 * PLANE_RADIUS)
 # What single precision carries, found by comparing pictures.
 COARSE = "Mitsuba's single precision is too coarse"
 DEEPEST = 16  # bounces
