@@ -26,7 +26,7 @@ def photograph_report() -> None:
     """The top of the report, as a browser shows it."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 1280, "height": 1150})
+        page = browser.new_page(viewport={"width": 1440, "height": 1150})
         page.goto((ROOT / "out" / "report.html").as_uri())
         page.screenshot(path=ROOT / "docs" / "report.png")
         browser.close()
