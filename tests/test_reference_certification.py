@@ -337,7 +337,7 @@ def test_requests_out_of_range(options: dict[str, int]) -> None:
 
 def test_what_is_too_much_work_stays_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = check_kinds(EXTREME["far and large"], 8, 8)
-    monkeypatch.setattr(certification, "WORK", 10 * 2 + 1)  # two surfaces
+    monkeypatch.setattr(certification, "WORK", 10 * 2 * 4 + 1)  # two surfaces, four rays
     certificate = certify(EXTREME["far and large"], width=8, height=8)
     assert [certificate.count(kind) for kind in (CERTAIN, KNIFE_EDGE, UNDECIDED)] == [10, 0, 54]
     assert np.array_equal(certificate.mask == CERTAIN, np.arange(64).reshape(8, 8) < 10)
