@@ -52,6 +52,7 @@ $(READY): requirements.txt pyproject.toml
 
 renderers:
 	@command -v povray >/dev/null || $(call debian,povray,povray)
+	@command -v tachyon >/dev/null || $(call debian,tachyon-bin-nox,tachyon)
 
 browser:
 	@command -v chromium >/dev/null || $(call debian,chromium,chromium)
