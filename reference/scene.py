@@ -49,12 +49,26 @@ class Plane:
         length = hypot(x, y, z)
         return (x / length, y / length, z / length)
 
+    @property
+    def tangents(self) -> tuple[Triple, Triple]:
+        """Two unit vectors along the plane; with the normal they are a right-handed basis."""
+        normal = self.unit_normal
+        x, y, z = (float(index == min(range(3), key=lambda i: abs(normal[i]))) for index in range(3))
+        across = _cross((x, y, z), normal)
+        length = hypot(*across)
+        across = (across[0] / length, across[1] / length, across[2] / length)
+        return across, _cross(normal, across)
+
     def distance_from(self, origin: Triple) -> float:
         """(point - origin) . unit_normal, rounded only at the end: 0 exactly if `origin` lies in the plane."""
         largest = max(abs(value) for value in self.normal)
         normal = [exact(value) / exact(largest) for value in self.normal]
         arm = [exact(a) - exact(b) for a, b in zip(self.point, origin, strict=True)]
         return float(sum(a * b for a, b in zip(arm, normal, strict=True))) / hypot(*map(float, normal))
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 Surface = TypeVar("Surface", Sphere, Plane)

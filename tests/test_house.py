@@ -17,7 +17,14 @@ PACKAGES = ("reference", "translator", "reports")
 # What each part may import of ours, narrowest part first; a longer name allows everything below it.
 ALLOWED = {
     "translator.renderers": ("reference.scene", "reference.text", "translator.contract"),
-    "translator": ("reference.errors", "reference.files", "reference.image", "reference.scene", "translator"),
+    "translator": (
+        "reference.errors",
+        "reference.files",
+        "reference.image",
+        "reference.scene",
+        "reference.text",
+        "translator",
+    ),
     "reports": ("reference", "reports"),
     "reference": ("reference",),
 }
@@ -45,7 +52,8 @@ def below(name: str, part: str) -> bool:
 def test_imports_point_the_right_way(path: Path) -> None:
     module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
     part = next(part for part in ALLOWED if below(module, part))
-    wrong = [name for name in imports(path) if not any(below(name, allowed) for allowed in ALLOWED[part])]
+    own = [".".join(module.split(".")[:3])] if part == "translator.renderers" else []  # its parts, if it has several
+    wrong = [name for name in imports(path) if not any(below(name, allowed) for allowed in (*ALLOWED[part], *own))]
     assert not wrong
 
 

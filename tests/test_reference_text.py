@@ -6,6 +6,7 @@ import sys
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -171,6 +172,14 @@ def test_normals_of_any_length_become_unit(direction: Triple, size: float) -> No
 
 def test_a_normal_may_span_all_magnitudes() -> None:
     assert Plane(SCENE.ambient, SCENE.ambient, (5e-324, -1e308, 0.0), 1, 0).unit_normal == (0.0, -1.0, 0.0)
+
+
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 3.0), (1.0, -2.0, 3.0), (1e-300, 1e-300, -2e-300), (1.0, 1e-9, 0.0)])
+def test_tangents_and_normal_are_a_right_handed_basis(normal: tuple[float, float, float]) -> None:
+    plane = Plane(SCENE.ambient, SCENE.ambient, normal, 1, 0)
+    basis = np.array([*plane.tangents, plane.unit_normal])
+    assert basis @ basis.T == pytest.approx(np.eye(3), abs=1e-15)
+    assert np.linalg.det(basis) == pytest.approx(1)
 
 
 def test_of_twin_spheres_the_first_stays() -> None:

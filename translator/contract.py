@@ -3,6 +3,7 @@
 A renderer is one module in `translator/renderers`; its name there (`_` read as `-`) is the renderer's name. It has:
 
     TITLE    the name people know
+    LICENCE  under which it comes, as SPDX spells it
     INSTALL  the line to type where it is missing
     VERSION  (command, pattern): group 1 of the pattern in what the command prints is the version
     TIMING   pattern: group 1 in the log of a run is the seconds that tracing alone took
@@ -20,6 +21,7 @@ from typing import Protocol
 
 from reference.errors import CrossrayError
 from reference.scene import Scene
+from reference.text import dump
 
 SMALLEST, LARGEST = 1e-25, 1e25  # of colours and coefficients in single precision, so that products stay in range
 PYTHON = "python"  # as the first word of a command: the Python that runs crossray
@@ -32,7 +34,7 @@ class Settings:
     width: int = 1000
     height: int = 1000
     depth: int = 3  # bounces after the primary hit
-    threads: int = 2
+    threads: int = 2  # that the renderer may use
 
 
 @dataclass(frozen=True)
@@ -83,10 +85,16 @@ def single(value: float) -> str:
     return number(value)
 
 
+def source(scene: Scene, prefix: str) -> str:
+    """The scene as the assignment writes it, every line behind `prefix`: a comment that an export traces back to."""
+    return "".join(f"{prefix}{line}\n" for line in dump(scene).splitlines())
+
+
 class Adapter(Protocol):
     """The shape of a renderer's module."""
 
     TITLE: str
+    LICENCE: str
     INSTALL: str
     VERSION: tuple[tuple[str, ...], str]
     TIMING: str

@@ -1,6 +1,33 @@
 // A scene of the recursive ray tracing assignment, for POV-Ray 3.7
 // Run: povray +Iscene.pov +Oscene.png +W64 +H48 -A -D -P +FN16 File_Gamma=1.0 +WT2
 // The colours are linear: no gamma. Coordinates are the assignment's, times Unit.
+// The scene as the assignment writes it:
+//
+//   255 255 255
+//   0.1
+//   2
+//   250 200 0
+//   50 -70 300
+//   30
+//   1
+//   0.2
+//   255 100 0
+//   -60 -40 300
+//   60
+//   1
+//   0.2
+//   2
+//   183 105 106
+//   0 -100 0
+//   0 1 0
+//   0.5
+//   1
+//   10 10 10
+//   0 -100 800
+//   0 0 -1
+//   1
+//   0.5
+
 #version 3.7;
 #declare Unit = 0.1;
 

@@ -1,6 +1,38 @@
 // A scene of the recursive ray tracing assignment, for POV-Ray 3.7
 // Run: povray +Iscene.pov +Oscene.png +W64 +H48 -A -D -P +FN16 File_Gamma=1.0 +WT2
 // The colours are linear: no gamma. Coordinates are the assignment's, times Unit.
+// The scene as the assignment writes it:
+//
+//   10 200 90
+//   0.3
+//   3
+//   255 0 0
+//   5 5 90
+//   8
+//   0.5
+//   0.25
+//   0 255 0
+//   0 0 300
+//   40
+//   1
+//   1.5
+//   0 0 255
+//   0 0 300
+//   40
+//   0.2
+//   0
+//   2
+//   200 100 50
+//   0 0 400
+//   0 3000 4000
+//   0.5
+//   0.75
+//   60 70 80
+//   0 -20 0
+//   0 1 0
+//   1
+//   0.1
+
 #version 3.7;
 #declare Unit = 0.1;
 

@@ -7,6 +7,7 @@ from reference.text import dump
 from translator.contract import PYTHON, Export, Limits, Settings
 
 TITLE = "crossray"
+LICENCE = "MIT"
 INSTALL = "pip install crossray"
 VERSION = ((PYTHON, "-m", "crossray", "--version"), r"crossray (\S+)")
 TIMING = r"traced in ([0-9.e-]+) s"

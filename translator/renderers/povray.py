@@ -16,9 +16,10 @@ from reference.scene import (
     distinct_planes,
     distinct_spheres,
 )
-from translator.contract import Export, Limits, Settings, Unsupported, number, single
+from translator.contract import Export, Limits, Settings, Unsupported, number, single, source
 
 TITLE = "POV-Ray"
+LICENCE = "AGPL-3.0-or-later"
 INSTALL = "apt-get install povray"
 VERSION = (("povray", "--version"), r"POV-Ray (\d[\w.]*)")
 TIMING = r"Trace Time:.*\(([0-9.]+) seconds\)"
@@ -34,6 +35,9 @@ HEADER = """\
 // {title}
 // Run: {command}
 // The colours are linear: no gamma. Coordinates are the assignment's, times Unit.
+// The scene as the assignment writes it:
+//
+{source}
 #version 3.7;
 #declare Unit = {unit};
 
@@ -65,6 +69,7 @@ def export(scene: Scene, settings: Settings) -> Export:
     header = HEADER.format(
         title="A scene of the recursive ray tracing assignment, for POV-Ray 3.7",
         command=" ".join(command),
+        source=source(scene, "//   "),
         unit=UNIT,
         levels=settings.depth + 1,
         depth=settings.depth,

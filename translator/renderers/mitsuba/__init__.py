@@ -15,13 +15,13 @@ from reference.scene import (
     Plane,
     Scene,
     Sphere,
-    Triple,
     distinct_planes,
     distinct_spheres,
 )
-from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single
+from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single, source
 
 TITLE = "Mitsuba 3"
+LICENCE = "BSD-3-Clause"
 INSTALL = "pip install mitsuba"
 VERSION = ((PYTHON, "-c", "import importlib.metadata as m; print('mitsuba', m.version('mitsuba'))"), r"mitsuba (\S+)")
 TIMING = r"traced in ([0-9.e-]+) s"
@@ -44,7 +44,9 @@ APART = 1e-3  # between surfaces that look alike
 HEADER = """\
 <!-- A scene of the recursive ray tracing assignment, for Mitsuba 3.
      Run: {command}
-     The picture is linear: 1.0 is level 255. -->
+     The picture is linear: 1.0 is level 255. The scene as the assignment writes it:
+
+{source}-->
 <scene version="3.0.0">
   <integrator type="whitted">
     <integer name="max_depth" value="{depth}"/>
@@ -103,6 +105,7 @@ def export(scene: Scene, settings: Settings) -> Export:
     command = (PYTHON, "whitted.py", "scene.xml", "scene.exr")
     header = HEADER.format(
         command=" ".join(command),
+        source=source(scene, "     "),
         depth=settings.depth,
         stretch=settings.width / settings.height,
         fov=math.degrees(2 * math.atan(SCREEN / SCREEN_DISTANCE)),
@@ -188,11 +191,8 @@ def _ball(sphere: Sphere) -> str:
 def _frame(plane: Plane) -> str:
     """The unit disk, widened and turned by a rotation of full precision (`lookat` would lose digits of the normal)."""
     normal, offset = plane.unit_normal, plane.distance_from(EYE)
-    axis = [float(index == min(range(3), key=lambda i: abs(normal[i]))) for index in range(3)]
-    across = _unit(_cross(axis, normal))
-    along = _cross(normal, across)
     centre = [value * offset + 0.0 for value in normal]  # nearest the eye; never -0.0
-    widened = ([PLANE_RADIUS * value for value in axis] for axis in (across, along))
+    widened = ([PLANE_RADIUS * value for value in axis] for axis in plane.tangents)
     rows = [list(row) for row in zip(*widened, normal, centre, strict=True)]
     matrix = "  ".join(_spaced(row) for row in [*rows, [0.0, 0.0, 0.0, 1.0]])
     return f'<transform name="to_world"><matrix value="{matrix}"/></transform>'
@@ -201,15 +201,6 @@ def _frame(plane: Plane) -> str:
 def _constant(name: str, values: list[float]) -> str:
     value = " ".join(map(single, values))
     return f'<texture type="rawconstant" name="{name}"><vector name="value" value="{value}"/></texture>'
-
-
-def _cross(a: Any, b: Any) -> Triple:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def _unit(a: Triple) -> Triple:
-    length = math.hypot(*a)
-    return (a[0] / length, a[1] / length, a[2] / length)
 
 
 def _spaced(values: Any) -> str:

@@ -23,10 +23,10 @@ from reference.scene import (
     distinct_spheres,
     exact,
 )
-from reference.text import dump
-from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single
+from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single, source
 
 TITLE = "Tachyon"
+LICENCE = "BSD-3-Clause"
 INSTALL = "apt-get install tachyon-bin-nox"
 VERSION = (("tachyon", "no.dat"), r"Version (\d[\w.]*)")  # `tachyon -version` ends with 255
 TIMING = r"Ray Tracing Time: +([0-9.]+) seconds"
@@ -264,7 +264,7 @@ def _header(scene: Scene, settings: Settings, command: str, paint: _Paint) -> st
     return HEADER.format(
         title="A scene of the recursive ray tracing assignment, for Tachyon 0.99",
         command=command,
-        source="".join(f"#   {line}\n" for line in dump(scene).splitlines()),
+        source=source(scene, "#   "),
         width=settings.width,
         height=settings.height,
         depth=settings.depth,
@@ -291,7 +291,7 @@ def _plane(name: str, plane: Plane, paint: _Paint, behind: bool, end: float) -> 
     foot = [value * plane.distance_from(EYE) + 0.0 for value in normal]  # never -0.0
     place = f"CENTER {_spaced(foot)} NORMAL {_spaced(normal)}"
     if behind:
-        shape = _triangle(foot, normal, end)
+        shape = _triangle(plane, foot, end)
     else:
         shape = f"PLANE {place}" if end == ENDLESS else f"RING {place} INNER -1 OUTER {number(end)}"
     text = f"# {name}\n{shape}\n  {paint.texture(plane, diffuse, opacity)}\n"
@@ -301,13 +301,11 @@ def _plane(name: str, plane: Plane, paint: _Paint, behind: bool, end: float) -> 
     return f"{text}# {name}, far away\n{rest}\n  {paint.texture(plane, diffuse, opacity, mirrors=False)}\n"
 
 
-def _triangle(foot: Iterable[float], normal: Triple, radius: float) -> str:
+def _triangle(plane: Plane, foot: Iterable[float], radius: float) -> str:
     """A triangle around a circle. Its corners turn away from the normal, which Tachyon then keeps for its back."""
-    axis = [float(index == min(range(3), key=lambda i: abs(normal[i]))) for index in range(3)]
-    across = _cross(axis, normal)
-    along = _cross(normal, across)
+    normal, (across, along) = plane.unit_normal, plane.tangents
     corners = [
-        [f + radius / math.hypot(*across) * (a * u + b * v) for f, u, v in zip(foot, across, along, strict=True)]
+        [f + radius * (a * u + b * v) for f, u, v in zip(foot, across, along, strict=True)]
         for a, b in ((-2, -1), (0, 2), (2, -1))
     ]
     places = " ".join(f"V{index} {_spaced(corner)}" for index, corner in enumerate(corners))
