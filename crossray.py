@@ -8,9 +8,10 @@ import re
 import signal
 import sys
 import warnings
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -24,8 +25,10 @@ from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
 
 if TYPE_CHECKING:
     from translator.contract import Settings
+    from translator.run import Outcome
 
 DONE, DISAGREES, BAD_INPUT, NOT_DONE, SIGNALLED = 0, 1, 2, 3, 128
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SHOWN_WARNINGS = 20
 TIMED_RUNS = 5
 SHORTEST_PROOF = 600.0  # seconds that proving a picture may take, whatever renderers may
@@ -183,18 +186,19 @@ def export(
     """
     import shlex
 
+    from reference.errors import RendererError
     from translator.contract import Unsupported
-    from translator.registry import adapter, check_names, renderer_names
-    from translator.run import command_line, write_export
+    from translator.registry import check_names, renderer_names
+    from translator.run import command_line, export_scene, write_export
 
     check_names(_split(to))
     loaded, settings = _load(scene, quiet), _settings(size, depth)
-    adapters = {name: adapter(name) for name in _split(to) or renderer_names()[1:]}
+    names = _split(to) or renderer_names()[1:]
     refused = 0
-    for name, renderer in adapters.items():
+    for name in names:
         try:
-            exported = renderer.export(loaded, settings)
-        except Unsupported as reason:
+            exported = export_scene(name, loaded, settings)
+        except (Unsupported, RendererError) as reason:
             refused += 1
             print(f"{name}: not exported: {reason}", file=sys.stderr)
             continue
@@ -202,7 +206,7 @@ def export(
         _print(f"(cd -- {shlex.quote(str(output / name))} && {command_line(exported)})")
         for note in exported.notes if verbose else ():
             print(f"{name}: {note}", file=sys.stderr)
-    if refused and refused == len(adapters):
+    if refused and refused == len(names):
         raise FailureError("no renderer can carry this scene")
 
 
@@ -229,27 +233,33 @@ def check(
     """
     from reference.text import dump
     from reports.recording import Recording
-    from reports.terminal import progress_bar, summary_lines
+    from reports.terminal import progress_lines, summary_lines
     from reports.writing import write_reports
+    from translator.concurrency import Job, run_jobs
     from translator.registry import TRUTH, check_names, renderer_names
-    from translator.run import run_renderer
 
     required = _split(renderers)
     names = required or renderer_names()
     check_names(names)
     loaded = [(path, _load(path, quiet)) for path in scenes or _examples()]
     settings = _settings(size, depth)
+    limits = {name: max(timeout, SHORTEST_PROOF) if name == TRUTH else timeout for name in (TRUTH, *names)}
+    jobs = [Job(name, path, scene, settings, limit) for path, scene in loaded for name, limit in limits.items()]
+    steps = dict.fromkeys(limits, len(loaded)) | {"comparing": len(loaded) * len(names)}
     run = Recording(out, _version())
-    with progress_bar(quiet, verbose, len(loaded) * (2 * len(names) + 1)) as advance:
-        for path, scene in loaded:
-            entry = run.add_scene(path, size.width, size.height, depth=depth, convention="exact", text=dump(scene))
-            for name in (TRUTH, *names):
-                advance(f"{entry['scene']}: {name}")
-                limit = max(timeout, SHORTEST_PROOF) if name == TRUTH else timeout
-                outcome = run_renderer(name, scene, settings, limit)
-                facts = {key: value for key, value in vars(outcome).items() if key != "picture"}
-                run.add_picture(entry, facts, outcome.picture)
-        results = write_reports(out, advance)
+    with progress_lines(quiet, verbose, steps) as show:
+
+        def report(job: Job, outcome: Outcome | None) -> None:
+            what = f"{job.title}: {_ending(outcome)}" if outcome else job.title
+            show(job.renderer, what, 1 if outcome else 0)
+
+        with closing(run_jobs(jobs, report)) as outcomes:
+            for path, scene in loaded:
+                entry = run.add_scene(path, size.width, size.height, depth=depth, convention="exact", text=dump(scene))
+                for outcome in islice(outcomes, len(limits)):
+                    facts = {key: value for key, value in vars(outcome).items() if key != "picture"}
+                    run.add_picture(entry, facts, outcome.picture)
+        results = write_reports(out, lambda text: show("comparing", text, 1))
     _print("\n".join(summary_lines(results)))
     _say(f"{out / 'report.html'}", quiet)
     raise typer.Exit(_exit_code(results, required))
@@ -350,7 +360,7 @@ def certify(
     from reference.certification import certify
     from reference.image import check_format, write_image
     from reports.certificate import as_data, as_text
-    from reports.terminal import progress_bar
+    from reports.terminal import progress_lines
 
     for path in filter(None, (output, mask)):
         check_format(path)
@@ -358,8 +368,9 @@ def certify(
         raise InputError(f"{mask}: expected another name ending in .png for the mask")
     loaded = _load(scene, quiet)
     start = perf_counter()
-    with progress_bar(quiet, verbose, 100) as advance:
-        certificate = certify(loaded, width=size.width, height=size.height, depth=depth, progress=advance)
+    with progress_lines(quiet, verbose, {"certify": 100}) as show:
+        shape = {"width": size.width, "height": size.height, "depth": depth}
+        certificate = certify(loaded, **shape, progress=lambda text: show("certify", text, 1))
     _say(f"certified in {perf_counter() - start:.3f} s", quiet)
     if output:
         write_image(output, certificate.picture)
@@ -381,6 +392,7 @@ def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
     crossray doctor
     """
     from reference.device import describe
+    from reference.errors import RendererError
     from translator.registry import NATIVE, adapter, renderer_names
     from translator.run import installed_version
 
@@ -389,8 +401,11 @@ def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
     for name, fine, text in parts:
         _print(f"{'works  ' if fine else 'BROKEN '} {name}: {text}")
     for name in renderer_names():
-        version = installed_version(name)
-        renderer = adapter(name)
+        try:
+            renderer, version = adapter(name), installed_version(name)
+        except RendererError as error:
+            _print(f"BROKEN  {name}: {error}")
+            continue
         if version and name == NATIVE and not healthy:
             _print(f"BROKEN  {name}: {renderer.TITLE} {version} needs what is broken above")
         elif version:
@@ -402,7 +417,7 @@ def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
 
 def main() -> None:
     """The console script."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in SIGNALS:
         signal.signal(number, _stop)
     try:
         app()
@@ -422,7 +437,9 @@ def main() -> None:
 
 
 def _stop(number: int, frame: object) -> None:
-    """End as on an error: what was begun is cleared away, what was finished stays."""
+    """End as on an error: what was begun is cleared away, what was finished stays. Nothing can interrupt that."""
+    for other in SIGNALS:
+        signal.signal(other, signal.SIG_IGN)
     _fail("interrupted", SIGNALLED + number)
 
 
@@ -463,8 +480,9 @@ def _examples() -> list[str]:
 
 def _settings(size: Size, depth: int) -> Settings:
     from translator.contract import Settings
+    from translator.process import usable_cores
 
-    return Settings(size.width, size.height, depth, threads=os.cpu_count() or 1)
+    return Settings(size.width, size.height, depth, threads=len(usable_cores()))
 
 
 def _exit_code(results: dict[str, Any], required: list[str]) -> int:
@@ -477,6 +495,10 @@ def _exit_code(results: dict[str, Any], required: list[str]) -> int:
     if missing or any(picture["status"] == "failed" for picture in [*references, *pictures]):
         return NOT_DONE
     return DISAGREES if any(picture["verdict"] == "disagree" for picture in pictures) else DONE
+
+
+def _ending(outcome: Outcome) -> str:
+    return outcome.status + (f" in {outcome.seconds:.1f} s" if outcome.seconds else "")
 
 
 def _say(text: str, quiet: bool = False) -> None:

@@ -12,6 +12,9 @@ from pathlib import Path
 
 from reference.errors import OutputError
 
+UMASK = os.umask(0o077)  # which can only be read by changing it, for all threads
+os.umask(UMASK)
+
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
@@ -34,7 +37,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         if target.exists():
             shutil.copymode(target, temporary)
         else:
-            temporary.chmod(0o666 & ~_umask())
+            temporary.chmod(0o666 & ~UMASK)
         os.replace(temporary, target)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
@@ -58,9 +61,3 @@ def make_folder(path: str | Path) -> Path:
         reason = "a file is in the way" if error.errno in (errno.EEXIST, errno.ENOTDIR) else error.strerror
         raise OutputError(f"{path}: cannot be made a folder: {(reason or str(error)).lower()}") from error
     return Path(path)
-
-
-def _umask() -> int:
-    mask = os.umask(0o077)
-    os.umask(mask)
-    return mask

@@ -77,6 +77,7 @@ class Recording:
             "notes": [],
             "limits": {},
             "summary": None,
+            "threads": None,
         }
 
     def _unique(self, name: str) -> str:

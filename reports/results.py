@@ -38,7 +38,7 @@ def _judge_scene(folder: Path, entry: dict[str, Any], progress: Callable[[str], 
     prover = _prover(entry)
     comparisons = []
     for picture in others:
-        progress(f"{entry['scene']}: comparing {picture['renderer']}")
+        progress(f"{entry['scene']}: {picture['renderer']}")
         comparisons.append(_compare(folder, truth, picture, prover))
     scene = {key: value for key, value in entry.items() if key != "pictures"}
     seconds = reference["seconds"] if reference["trace_seconds"] is None else reference["trace_seconds"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -30,27 +30,36 @@ def _finding(picture: dict[str, Any]) -> str:
 
 
 @contextmanager
-def progress_bar(quiet: bool, verbose: bool, total: int) -> Iterator[Callable[[str], None]]:
-    """A bar of `total` steps on a terminal; elsewhere a line for each step, if asked for. Call it as a step begins."""
+def progress_lines(quiet: bool, verbose: bool, totals: Mapping[str, int]) -> Iterator[Callable[[str, str, int], None]]:
+    """A line for each name, with a bar of as many steps, on a terminal; elsewhere what is said, if asked for.
+
+    Call it, from any thread, with a name, what it does, and how many steps of it that completes.
+    """
     if quiet or not sys.stderr.isatty():
-        yield lambda text: print(text, file=sys.stderr) if verbose and not quiet else None
+        yield lambda name, text, done: _tell(f"{name}: {text}\n") if verbose and not quiet else None
         return
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
+        TextColumn("{task.fields[name]}"),
         BarColumn(),
         TextColumn("{task.completed}/{task.total}"),
         TimeElapsedColumn(),
         TextColumn("{task.description}"),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task, begun = bar.add_task("", total=total), 0
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        tasks = {name: bars.add_task("", total=total, start=False, name=name) for name, total in totals.items()}
 
-        def advance(text: str) -> None:
-            nonlocal begun
-            bar.update(task, description=escape(text), completed=begun)
-            begun += 1
+        def show(name: str, text: str, done: int) -> None:
+            task = tasks[name]
+            bars.start_task(task)
+            bars.update(task, description=escape(text), advance=done)
 
-        yield advance
+        yield show
+
+
+def _tell(line: str) -> None:
+    sys.stderr.write(line)  # in one piece, as threads may tell at the same time
+    sys.stderr.flush()

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from helpers import EXAMPLE, TRICKY, exact, need, pixels_over
 
+import translator.process
 import translator.run
 from reference import Scene
 from reference.image import Picture, write_image
@@ -261,7 +262,7 @@ def test_huge_output_is_cut_to_its_end(draw: Draw, separator: str) -> None:
     )
     assert outcome.status == "rendered"
     assert outcome.log.endswith("the end\n")
-    assert len(outcome.log) <= translator.run.KEPT_LOG
+    assert len(outcome.log) <= translator.process.KEPT_LOG
     assert "line 0" not in outcome.log.splitlines()
 
 

@@ -124,7 +124,7 @@ def export(scene: Scene, settings: Settings) -> Export:
         "Diffuse and mirror are one blended BSDF: a share of 2^-23 for diffuse, whose reflectance is scaled by 2^23.",
         "Ambient light is emission. Planes are disks of radius 1e9.",
     )
-    return Export(files, (*command, "--time"), "scene.exr", notes, limits=LIMITS)
+    return Export(files, (*command, "--threads", str(settings.threads), "--time"), "scene.exr", notes, limits=LIMITS)
 
 
 def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:

@@ -27,6 +27,7 @@ import mitsuba as mi
 
 mi.set_variant("llvm_ad_rgb")
 
+FEWEST_THREADS = 2  # with one, Mitsuba 3.9.1 waits for itself when it writes the picture
 MIRROR = 1  # the second lobe of the blended BSDF in the scene file; the first is diffuse
 
 
@@ -100,7 +101,9 @@ def main() -> None:
     parser.add_argument("scene", type=Path)
     parser.add_argument("picture", type=Path)
     parser.add_argument("--time", action="store_true", help="print how long tracing takes, without compilation")
+    parser.add_argument("--threads", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
+    dr.set_thread_count(max(FEWEST_THREADS, options.threads))
     mi.register_integrator("whitted", Whitted)
     scene = mi.load_file(str(options.scene))
     image = mi.render(scene)
