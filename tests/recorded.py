@@ -82,6 +82,7 @@ def facts(renderer: str, status: str = "rendered", reason: str | None = None, lo
         "notes": ["a <b>note</b>"] if ran else [],
         "limits": {"precision": 2.0**-20, "gap": 0.01} if status == "rendered" else {},
         "summary": f"{renderer} <b>in short</b>" if status == "rendered" else None,
+        "threads": 2,
     }
 
 

@@ -198,6 +198,12 @@ def test_page_needs_nothing_else_and_nothing_is_injected(folder: Path) -> None:
     assert "{{ 7 * 7 }}" in text
 
 
+def test_page_records_how_each_picture_was_drawn(folder: Path) -> None:
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<pre>povray &#39;&lt;b&gt;&#39; &amp;&amp; true</pre><p>Povray 1.2 &lt;b&gt;, on 2 cores.</p>" in html
+    assert "Tachyon of unknown" not in html
+
+
 def test_page_says_what_each_class_is_and_how_many_pixels_it_has(folder: Path) -> None:
     text = (folder / "report.html").read_text(encoding="utf-8")
     for kind, meaning in CLASSES.items():
