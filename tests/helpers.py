@@ -4,7 +4,9 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
@@ -53,15 +55,25 @@ TRICKY = """\
 def need(program: str) -> str:
     """The path of a program; without it the test is skipped, and in continuous integration it fails."""
     path = shutil.which(program)
-    if path is None and os.environ.get("CI") == "true":
-        pytest.fail(f"{program} is not installed")
     if path is None:
-        pytest.skip(f"{program} is not installed")
+        _miss(program)
     return path
 
 
-def exact(scene: Scene, width: int, height: int) -> NDArray[np.float64]:
-    return np.asarray(render(scene, EXACT, width=width, height=height, dtype=np.float64))
+def need_module(name: str) -> None:
+    """Go on only with a Python package; without it the test is skipped, and in continuous integration it fails."""
+    if find_spec(name) is None:
+        _miss(name)
+
+
+def _miss(name: str) -> NoReturn:
+    if os.environ.get("CI") == "true":
+        pytest.fail(f"{name} is not installed")
+    pytest.skip(f"{name} is not installed")
+
+
+def exact(scene: Scene, width: int, height: int, depth: int = 3) -> NDArray[np.float64]:
+    return np.asarray(render(scene, EXACT, width=width, height=height, depth=depth, dtype=np.float64))
 
 
 def pixels_over(a: NDArray[np.floating], b: NDArray[np.floating], level: float = 0.5) -> int:
