@@ -21,7 +21,7 @@ from reference import Plane, Scene, Sphere
 from reference.image import Picture, read_image
 from reference.scene import LIGHT, Triple
 from reference.text import parse
-from translator.contract import Export, Settings, Unsupported
+from translator.contract import Export, Limits, Settings, Unsupported
 from translator.renderers import radiance
 from translator.renderers.radiance import faces, limits
 from translator.run import installed_version, run_renderer, write_export
@@ -147,10 +147,12 @@ def test_nothing_mirrors_at_depth_0() -> None:
 
 def test_far_planes_make_the_unit_small() -> None:
     near, far = export(FLOOR), export(FLOOR, plane((0, 0, 3e7), (0, 0, -1)))
-    assert (near.limits.gap, near.limits.far) == (1e-6, 1e10)
-    assert (far.limits.gap, far.limits.far) == pytest.approx((1e-2, 1e14))
+    assert near.limits == Limits(precision=1e-8, gap=1e-6, far=1e8)
+    assert far.limits.gap == pytest.approx(1e-3)
+    assert (export(NEAR).limits.far, export(plane((0, 0, 3e7), (0, 0, 1))).limits.far) == pytest.approx((1e10, 1e13))
+    assert export(plane((0, 0.5, 0), (0, 1, 0))).limits.far == 1e6
     assert "z negated" in near.files["scene.rad"]
-    assert "times 0.0001, z negated" in far.files["scene.rad"]
+    assert "times 0.001, z negated" in far.files["scene.rad"]
 
 
 def test_the_lamp_keeps_clear_of_surfaces() -> None:
@@ -184,9 +186,9 @@ REFUSED = {
     ),
     "radius": (scene_of(NEAR, ball(0, 0, 300, 1e-6)), 3, "Radiance knows no radius up to 1e-06: sphere 2 has 1e-06"),
     "radius beside a far plane": (
-        scene_of(ball(0, 0, 300, 1e-3), plane((0, 0, 3e7), (0, 0, 1))),
+        scene_of(ball(0, 0, 300, 1e-4), plane((0, 0, 3e7), (0, 0, 1))),
         3,
-        "Radiance knows no radius up to 0.01: sphere 1 has 0.001",
+        "Radiance knows no radius up to 0.001: sphere 1 has 0.0001",
     ),
     "sphere at the light": (
         scene_of(NEAR, ball(500, 500, 600, 99.99)),
@@ -385,7 +387,7 @@ def test_no_more_processes_run_than_threads_are_given(
     running, most = [], []
     original = render.run
 
-    def counted(*command: str, given: bytes = b"") -> bytes:
+    def counted(*command: str, given: bytes | memoryview = b"") -> bytes:
         running.append(command)
         most.append(len(running))
         assert "-n" not in command

@@ -1,4 +1,4 @@
-"""Radiance: its own surfaces, materials, lamp and view; `rtrace` runs once for the lamp and once for ambient light."""
+"""Radiance: its own surfaces, materials, lamp and view; `rtrace` draws what the lamp and what ambient light adds."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ TIMING = r"traced in ([0-9.e-]+) s"
 HEADER = """\
 # A scene of the recursive ray tracing assignment, for Radiance.
 # Run: {command}
-# A material has one colour for all light, so that this adds a picture under the lamp and one under ambient light.
-# Radiance's own programs give the same in its own format, with fewer digits:
+# The picture is the sum of one under the lamp and one under ambient light, as a material has one colour for both.
+# Radiance's own programs draw the same in its own format, with fewer digits:
 {steps}#
-# The picture is linear: 1.0 is level 255. By scene.opt ambient light is the same everywhere, one shadow ray goes to
-# the centre of the lamp, mirrors are perfect, and no ray is too faint. Planes are disks; a
-# bubble is a sphere seen from inside. Coordinates are the assignment's{scale}, z negated, as views are right-handed.
+# The picture is linear: 1.0 is level 255. Coordinates are the assignment's{scale}, z negated, as Radiance's
+# views are right-handed. Planes are disks; a bubble is a sphere seen from inside. By scene.opt ambient light is the
+# same everywhere, one shadow ray goes to the centre of the lamp, mirrors are perfect and no ray is too faint.
 #
 # The scene as the assignment writes it:
 #
@@ -81,7 +81,7 @@ def export(scene: Scene, settings: Settings) -> Export:
         "The picture is a sum: what the lamp adds and what ambient light adds, as a material has one colour for both.",
         f"Planes are disks of radius {PLANE_RADIUS / unit:g}, {THICKNESS / unit:g} thick if both sides are seen.",
     )
-    return Export(files, command, "scene.exr", notes, limits=limits_for(unit))
+    return Export(files, command, "scene.exr", notes, limits=limits_for(planes, unit))
 
 
 def _steps(layers: Iterable[str], settings: Settings) -> str:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-from reference.scene import EYE, LIGHT, Plane, Sphere, holds_light
+from reference.scene import EYE, LIGHT, SCREEN_DISTANCE, Plane, Sphere, holds_light
 from translator.contract import Limits, Unsupported
 
-TINY, HUGE = 1e-6, 1e10  # FTINY and FHUGE: its distances that count as zero and as infinite; TINY also bounds |d.n|
-PRECISION = 2.0**-27  # of two surfaces within TINY along a ray either may be seen, at distances from 100 on
+TINY, HUGE = 1e-6, 1e10  # FTINY and FHUGE: distances that count as zero and as infinite; TINY also bounds |d.n|
+HORIZON = 1e-5  # |d.n| from which on rays meet planes before infinity
 FARTHEST = 1e8  # of surfaces
 DEEPEST = 1000  # bounces: several thousand overflow rtrace's stack
 LAMP, SMALLEST_LAMP = 100.0, 0.01  # radius
 LAMP_SHARE = 1e-6  # smallest radius of a lamp over the distance from which double precision must find it
-DARKEST = TINY  # luminance of a diffuse colour that is left out
+DARKEST = 1e-6  # luminance of a diffuse colour that is left out
 LUMINANCE = (0.265, 0.67, 0.065)  # of red, green and blue
 LOST = 0.1  # levels that a colour left out may come to
 
@@ -21,17 +21,18 @@ Surfaces = dict[str, Sphere | Plane]  # by name
 
 
 def unit_for(planes: dict[str, Plane]) -> float:
-    """What a length of 1 becomes: so little that rays meet planes before infinity unless |d.n| counts as zero."""
+    """What a length of 1 becomes: small enough for rays to meet planes down to HORIZON."""
     farthest = max(map(reach, planes.values()), default=0.0)
     unit = 1.0
-    while farthest * unit > HUGE * TINY:
+    while farthest * unit > HUGE * HORIZON:
         unit /= 10
     return unit
 
 
-def limits_for(unit: float) -> Limits:
-    """Zero and infinity are fixed in Radiance's units."""
-    return Limits(PRECISION, TINY / unit, HUGE / unit)
+def limits_for(planes: dict[str, Plane], unit: float) -> Limits:
+    """Of surfaces within TINY along a ray any may be seen; rays within TINY of being parallel miss planes."""
+    far = min([HUGE / unit, *(max(1.0, reach(plane)) / TINY for plane in planes.values())])
+    return Limits(precision=TINY / unit / SCREEN_DISTANCE, gap=TINY / unit, far=far)
 
 
 def refuse(surfaces: Surfaces, depth: int, unit: float) -> None:

@@ -27,13 +27,13 @@ LAYERS = {  # by the name of the materials: the options, the sign in the sum
     "light-negative": (LIGHT, -1),
     "ambient-negative": (AMBIENT, -1),
 }
-SETTINGS = {"RAYPATH": str(BINPATH.parent / "lib")}  # where Radiance's library is; nothing of the user's
+ENVIRONMENT = {"RAYPATH": str(BINPATH.parent / "lib")}  # where Radiance's library is; nothing of the user's
 
 
-def run(program: str, *options: str, given: bytes = b"") -> bytes:
+def run(program: str, *options: str, given: bytes | memoryview = b"") -> bytes:
     """What one of Radiance's programs writes. Ends with its exit code if it fails; it has said why, unless stopped."""
     command = [BINPATH / program, *options]
-    finished = subprocess.run(command, input=given, stdout=subprocess.PIPE, env=SETTINGS, check=False)
+    finished = subprocess.run(command, input=given, stdout=subprocess.PIPE, env=ENVIRONMENT, check=False)
     if finished.returncode < 0:
         raise SystemExit(f"{program} was stopped by signal {-finished.returncode}")
     if finished.returncode > 0:
@@ -41,7 +41,7 @@ def run(program: str, *options: str, given: bytes = b"") -> bytes:
     return finished.stdout
 
 
-def trace(layer: str, rays: bytes) -> NDArray[np.float32]:
+def trace(layer: str, rays: bytes | memoryview) -> NDArray[np.float32]:
     """The colours that rays see in a layer, linear, three each."""
     options, _ = LAYERS[layer]
     return np.frombuffer(run("rtrace", "-h", "-fdf", "@scene.opt", *options, f"{layer}.oct", given=rays), np.float32)
@@ -61,7 +61,7 @@ def main() -> None:
     # Rays go through the centres of pixels and start there, on the screen.
     rays = run("vwrays", "-fd", "-vf", "scene.vf", "-x", str(width), "-y", str(height), "-pa", "0")
     parts = np.array_split(np.frombuffer(rays).reshape(-1, 6), min(options.threads, height))
-    jobs = product(layers, [part.tobytes() for part in parts])
+    jobs = product(layers, [part.data.cast("B") for part in parts])
     begin = time.perf_counter()
     with ThreadPoolExecutor(options.threads) as pool:
         colours = np.concatenate(list(pool.map(trace, *zip(*jobs, strict=True))))
