@@ -7,6 +7,8 @@ The expected files are checked by hand against their scenes. After a change on p
 import os
 import re
 import subprocess
+import sys
+from ctypes import sizeof
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +22,7 @@ from reference.image import Picture, read_image
 from reference.text import dump, parse
 from translator.contract import PYTHON, Settings, Unsupported
 from translator.renderers.tachyon import export
-from translator.renderers.tachyon.draw import statements
+from translator.renderers.tachyon.draw import Colour, Texture, Vector, statements
 from translator.run import installed_version, run_renderer
 
 EXPECTED = Path(__file__).parent / "expected"
@@ -152,10 +154,10 @@ REFUSED = {
     "plane that cuts the screen": (scene_of(wall(0, -40, 0, 0, 3, 0)), 3, BEFORE.format("plane 1")),
     "plane on the screen": (scene_of(wall(7, 7, 100, 0, 0, 2)), 3, BEFORE.format("plane 1")),
     "eye in a sphere": (scene_of(ball(0, 0, 0, 200)), 3, WITHIN.format("sphere 1 holds the eye and not the light")),
-    "edge on pixel rays": (
+    "edge toward the eye": (
         scene_of(ball(-50, 0, 300, 60, 0.5), BALL, ball(0, -50, 300, 60)),
         3,
-        WITHIN.format("rays get in at the edge of sphere 1 and sphere 3"),
+        WITHIN.format("rays may get in at the edge of sphere 1 and sphere 3, which cut each other"),
     ),
     "plane through the eye": (
         scene_of(MIRROR, FLOOR, wall(9, 0, 9, 0, 1, 0)),
@@ -207,7 +209,8 @@ CARRIED = {
     "plane through the eye without mirrors": (scene_of(BALL, wall(9, 0, 9, 0, 1, 0)), 3),
     "plane through the eye that is never lit": (scene_of(MIRROR, wall(9, 0, 9, 0, -1, 0)), 3),
     "faint mirror that is not seen": (scene_of(replace(FLOOR, reflection=1e-9)), 0),
-    "edge between pixel rays": (scene_of(ball(-50, 0, 300, 60, 0.5), ball(50, 0, 300, 60)), 3),
+    "edge beside the eye": (scene_of(ball(-50, 0, 300, 60, 0.5), ball(50, 0, 300, 60.001)), 3),
+    "matte edge toward the eye": (scene_of(ball(-50, 0, 300, 60), ball(50, 0, 300, 60), FLOOR, MIRROR), 3),
     "light on a plane": (scene_of(wall(0, 0, 500, 0, 0, -1)), 3),
     "far away": (scene_of(ball(0, 0, 9e6, 1e5), wall(0, 0, 9.9e7, side=-1)), 3),
 }
@@ -225,6 +228,12 @@ def test_what_cannot_be_carried_is_refused_with_the_reason(case: str) -> None:
 def test_what_is_just_within_the_limits_is_carried(case: str) -> None:
     scene, depth = CARRIED[case]
     export(scene, Settings(64, 64, depth))
+
+
+def test_a_picture_whose_channels_tachyon_cannot_count_is_refused() -> None:
+    with pytest.raises(Unsupported, match=r"^Tachyon draws at most 715827882 pixels, not 715827883$"):
+        export(scene_of(BALL), Settings(715827883, 1))
+    export(scene_of(BALL), Settings(2 * 3 * 7, 715827882 // 42))
 
 
 def test_refusal_counts_surfaces_as_the_file_does() -> None:
@@ -278,6 +287,38 @@ def rendered(scene: Scene, width: int, height: int) -> Picture:
 def test_real_pictures_agree(name: str) -> None:
     scene = parse(SCENES[name])
     assert pixels_over(exact(scene, 160, 90), rendered(scene, 160, 90), 0.05) == 0
+
+
+def test_mirrored_rays_pass_through_the_light() -> None:
+    """The mirror shows the light exactly in a pixel, and behind it a wall."""
+    scene = scene_of(wall(0, 0, 20250, 0, 0, -1, reflection=0.9), wall(0, 0, -700, 0, 0, 1))
+    picture = rendered(scene, 200, 200)
+    assert picture[97, 102] == pytest.approx(exact(scene, 200, 200)[97, 102], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (("libtachyon.so.0", "libtachyon.so.9"), "libtachyon.so.9 is missing; on Debian: apt-get install tachyon-bin-"),
+        (("LIBTACHYON_0.9.9", "LIBTACHYON_1.0.0"), "libtachyon.so.0 is not Debian's Tachyon 0.99: it has no rt_initia"),
+    ],
+)
+def test_without_the_right_library_nothing_is_drawn(change: tuple[str, str], reason: str, tmp_path: Path) -> None:
+    need("tachyon")
+    files = export(parse(TRICKY), SETTINGS).files
+    (tmp_path / "draw.py").write_text(files["draw.py"].replace(*change), encoding="utf-8")
+    (tmp_path / "scene.dat").write_text(files["scene.dat"], encoding="ascii")
+    command = [sys.executable, "draw.py", "scene.dat", "scene.exr"]
+    run = subprocess.run(command, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert run.returncode == 1
+    assert run.stderr.startswith(reason)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["draw.py", "scene.dat"]
+
+
+def test_the_structures_are_those_of_the_header() -> None:
+    """Sizes and offsets in bytes, as a C compiler gives them for tachyon.h 0.99."""
+    assert (sizeof(Vector), sizeof(Colour), sizeof(Texture)) == (24, 12, 296)
+    assert [getattr(Texture, field[0]).offset for field in Texture._fields_] == [0, 4, 16, 24, 32, 40, 48, 56, 200]
 
 
 def test_the_program_draws_nearly_the_same(tmp_path: Path) -> None:

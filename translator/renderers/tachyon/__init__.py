@@ -2,51 +2,26 @@
 
 from __future__ import annotations
 
-import math
-from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from fractions import Fraction
 from importlib import resources
-from itertools import combinations, permutations
 
-from reference.scene import (
-    EYE,
-    LIGHT,
-    SCREEN,
-    SCREEN_DISTANCE,
-    Plane,
-    Scene,
-    Sphere,
-    Triple,
-    distinct_planes,
-    distinct_spheres,
-    exact,
-)
-from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single, source
+from reference.scene import EYE, LIGHT, Plane, Scene, Sphere, Triple, distinct_planes, distinct_spheres
+from translator.contract import PYTHON, Export, Settings, number, single, source
+from translator.renderers.tachyon.limits import ENDLESS, FAINTEST, LIMITS, UNIT, refuse
+from translator.renderers.tachyon.places import holds, is_lit, only_between, reach, slants
 
+PROGRAM = resources.files(__name__).joinpath("draw.py")
 TITLE = "Tachyon"
 LICENCE = "BSD-3-Clause"
 INSTALL = "apt-get install tachyon-bin-nox"
-VERSION = (("tachyon", "no.dat"), r"Version (\d[\w.]*)")  # `tachyon -version` ends with 255
+VERSION = ((PYTHON, str(PROGRAM), "--version"), r"Tachyon (\d[\w.]*)")
 TIMING = r"Ray Tracing Time: +([0-9.]+) seconds"
 
-UNIT = 2.0**-10  # what a length of 1 becomes: Tachyon's tolerance is absolute and suits this scale
-TOLERANCE = 1e-9 / UNIT  # a mirrored ray starts so far ahead, and no ray sees what is nearer to its start
-FAINTEST = 0.001959  # coefficients up to this count as 0
 DIMMED = 2.0**-20  # the light's colour, while its strength is the inverse: so no cosine is too faint
 UNTINTED = 2.0**-30  # stands for 0 in the tint, which the light's colour undoes
 FAR = 2.0**21  # where a slanting mirror ends: farther away it would by rounding see itself, instead of nothing
-ENDLESS = 2.0**30  # where a triangle ends that stands for a plane
-LIMITS = Limits(precision=2.0**-30, gap=2 * TOLERANCE, far=ENDLESS)
 SHADOWLESS = 0.999  # opacity of what looks opaque but casts no shadow
-
-# What Tachyon carries, found by comparing pictures.
-DEEPEST = 4096  # bounces: each takes up stack
-FARTHEST = 1e7  # of a sphere
-FARTHEST_PLANE = 1e8
-LIGHT_GAP = 1e-5  # between a surface and the light
-PARALLEL = 0.01  # radians between a slanting mirror and any other plane
 
 HEADER = """\
 # {title}
@@ -77,7 +52,8 @@ BACKGROUND 0 0 0
 
 # Bright by its attenuation and as much too dark by its colour: Tachyon leaves out light below 1/512.
 # AMBIENT is one number, so that the ambient colour is part of each surface's, and the light's undoes it.
-LIGHT CENTER {light} RAD 0
+# Mirrored rays straight into a small light would end on it; what is as large as this they meet nowhere.
+LIGHT CENTER {light} RAD 1e30
   ATTENUATION CONSTANT {dimmed} LINEAR 0 QUADRATIC 0 COLOR {light_colour}
 
 # Of surfaces at the same distance Tachyon takes the one listed last: they come in reverse order.
@@ -91,144 +67,20 @@ NOTES = (
 def export(scene: Scene, settings: Settings) -> Export:
     """A scene file, drawn in one pass, and the Python program that draws it."""
     spheres, planes = distinct_spheres(scene), distinct_planes(scene)
-    _refuse(spheres, planes, settings)
+    refuse(spheres, planes, settings)
     options = ("--unit", number(UNIT), "--threads", str(settings.threads))
     command = (PYTHON, "draw.py", "scene.dat", "scene.exr", *options)
     paint = _paint(scene)
     parts = [_header(scene, settings, " ".join(command), paint)]
     parts += [_sphere(name, sphere, paint) for name, sphere in reversed(spheres.items())]
-    parting = _parting(spheres, planes)
-    far = max([FAR, *(16 * _reach(sphere) for sphere in spheres.values())])
+    between = only_between(spheres, planes)
+    far = max([FAR, *(16 * reach(sphere) for sphere in spheres.values())])
     for name, plane in reversed(planes.items()):
-        behind = parting == [name] and _is_lit(plane)
-        ends = _slants(plane) and (behind or (settings.depth > 0 and plane.reflection != 0))
+        behind = name == between and is_lit(plane)
+        ends = slants(plane) and (behind or (settings.depth > 0 and plane.reflection != 0))
         parts.append(_plane(name, plane, paint, behind, far if ends else ENDLESS))
-    program = resources.files(__name__).joinpath("draw.py").read_text(encoding="utf-8")
-    files = {"scene.dat": "\n".join([*parts, "END_SCENE\n"]), "draw.py": program}
+    files = {"scene.dat": "\n".join([*parts, "END_SCENE\n"]), "draw.py": PROGRAM.read_text(encoding="utf-8")}
     return Export(files, command, "scene.exr", NOTES, limits=LIMITS)
-
-
-def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:
-    if settings.depth > DEEPEST:
-        raise Unsupported(f"Tachyon follows at most {DEEPEST} bounces, not {settings.depth}")
-    for name, sphere in spheres.items():
-        _refuse_place(name, _reach(sphere), FARTHEST, _comes_before_screen(sphere))
-        _refuse_light_gap(name, math.dist(sphere.centre, LIGHT) - sphere.radius)
-    for name, plane in planes.items():
-        _refuse_place(name, abs(plane.distance_from(EYE)), FARTHEST_PLANE, _passes_before_screen(plane))
-        if gap := plane.distance_from(LIGHT):
-            _refuse_light_gap(name, gap)
-    parting = _parting(spheres, planes)
-    around = spheres.get(parting[0]) if len(parting) == 1 else None
-    if around and around.diffuse and _holds(around, EYE):
-        raise Unsupported(f"Tachyon darkens spheres seen from within: {parting[0]} holds the eye and not the light")
-    if settings.depth > 0:
-        _refuse_mirrors(spheres, planes, settings)
-
-
-def _refuse_mirrors(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:
-    surfaces: dict[str, Sphere | Plane] = {**spheres, **planes}
-    if not any(surface.reflection for surface in surfaces.values()):
-        return
-    for name, surface in surfaces.items():
-        if surface.reflection and surface.reflection <= FAINTEST:
-            raise Unsupported(f"Tachyon leaves out reflections under 1/512: {name} has {surface.reflection:g}")
-    for one, two in _edges_on_rays(spheres, settings):
-        raise Unsupported(f"Tachyon darkens spheres seen from within: rays get in at the edge of {one} and {two}")
-    for name, plane in planes.items():
-        if _is_lit(plane) and not plane.distance_from(EYE):
-            raise Unsupported(f"Tachyon darkens planes seen from their back: mirrors may show both sides of {name}")
-    for (one, plane), (two, other) in permutations(planes.items(), 2):
-        turned = math.hypot(*_cross(plane.unit_normal, other.unit_normal))
-        if plane.reflection and _slants(plane) and turned < PARALLEL:
-            raise Unsupported(f"Tachyon's slanting mirrors end far away: {one} shows {two} even there")
-
-
-def _refuse_place(name: str, farthest: float, most: float, before_screen: bool) -> None:
-    if farthest > most:
-        raise Unsupported(f"Tachyon's rays stray beyond {most:g}: {name} reaches farther")
-    if before_screen:
-        raise Unsupported(f"Tachyon's camera sees what is before the screen: {name} comes into its view there")
-
-
-def _refuse_light_gap(name: str, gap: float) -> None:
-    if abs(gap) < LIGHT_GAP:
-        raise Unsupported(f"Tachyon decides by rounding whether {name} hides the light, which is {abs(gap):g} from it")
-
-
-def _comes_before_screen(sphere: Sphere) -> bool:
-    """Whether the sphere meets the pyramid of the eye and the screen, which may also be inside it as a whole."""
-    slope = SCREEN / SCREEN_DISTANCE
-    x, y, z = abs(sphere.centre[0]), abs(sphere.centre[1]), sphere.centre[2]
-
-    def distance(depth: float) -> float:
-        """From the centre to the pyramid's part at that z."""
-        return math.hypot(max(x - slope * depth, 0), max(y - slope * depth, 0), z - depth)
-
-    # The square of the distance is a convex chain of parabolas in z: its least value is at the bottom of one of them.
-    sides: tuple[tuple[float, ...], ...] = ((), (x,), (y,), (x, y))
-    bottoms = [(z + slope * sum(active)) / (1 + slope * slope * len(active)) for active in sides]
-    nearest = min(distance(min(max(depth, 0), SCREEN_DISTANCE)) for depth in bottoms)
-    corners = [(a, b, SCREEN_DISTANCE) for a in (-SCREEN, SCREEN) for b in (-SCREEN, SCREEN)]
-    return nearest < sphere.radius and not all(_holds(sphere, point) for point in (EYE, *corners))
-
-
-def _passes_before_screen(plane: Plane) -> bool:
-    """Whether rays of the camera meet the plane on the screen or before it."""
-    normal, offset = plane.unit_normal, plane.distance_from(EYE)
-    middle = SCREEN_DISTANCE * normal[2]  # n.d over the screen is middle -+ spread; the plane is met at offset / n.d
-    spread = SCREEN * (abs(normal[0]) + abs(normal[1]))
-    return offset != 0 and (middle + spread >= offset if offset > 0 else middle - spread <= offset)
-
-
-def _parting(spheres: dict[str, Sphere], planes: dict[str, Plane]) -> list[str]:
-    """The surfaces between eye and light, which no ray crosses: several leave all unlit, one all but itself."""
-    parting = [name for name, sphere in spheres.items() if _holds(sphere, EYE) != _holds(sphere, LIGHT)]
-    for name, plane in planes.items():
-        eye, light = plane.distance_from(EYE), plane.distance_from(LIGHT)
-        if min(eye, light) < 0 < max(eye, light):
-            parting.append(name)
-    return parting
-
-
-def _holds(sphere: Sphere, point: Triple) -> bool:
-    return math.dist(sphere.centre, point) < sphere.radius
-
-
-def _reach(sphere: Sphere) -> float:
-    return math.hypot(*sphere.centre) + sphere.radius
-
-
-def _is_lit(plane: Plane) -> bool:
-    """Whether the light is on the side that the normal points to, and has an effect there."""
-    return plane.diffuse != 0 and plane.distance_from(LIGHT) < 0
-
-
-def _slants(plane: Plane) -> bool:
-    """Whether points far away on the plane are off it by rounding."""
-    return sum(map(bool, plane.normal)) > 1
-
-
-def _edges_on_rays(spheres: dict[str, Sphere], settings: Settings) -> Iterator[tuple[str, str]]:
-    """The mirrors that cut each other in a circle which pixel rays meet exactly, since its plane holds the eye."""
-    powers = defaultdict(list)
-    for name, sphere in spheres.items():
-        powers[sum(exact(value) ** 2 for value in sphere.centre) - exact(sphere.radius) ** 2].append(name)
-    for name, other in (pair for names in powers.values() for pair in combinations(names, 2)):
-        one, two = spheres[name], spheres[other]
-        cut = abs(one.radius - two.radius) < math.dist(one.centre, two.centre) < one.radius + two.radius
-        if cut and (one.reflection or two.reflection):
-            x, y, z = (exact(b) - exact(a) for a, b in zip(one.centre, two.centre, strict=True))
-            if _meets_pixel(x, y, z * exact(SCREEN_DISTANCE) / exact(SCREEN), settings):
-                yield name, other
-
-
-def _meets_pixel(x: Fraction, y: Fraction, z: Fraction, settings: Settings) -> bool:
-    """Whether x column + y row + z = 0 for a pixel, its column and row from -1 to 1."""
-    columns, rows = ({Fraction(2 * i + 1 - n, n) for i in range(n)} for n in (settings.width, settings.height))
-    if not y:
-        return -z / x in columns if x else not z
-    return any(-(x * column + z) / y in rows for column in columns)
 
 
 @dataclass(frozen=True)
@@ -278,14 +130,14 @@ def _header(scene: Scene, settings: Settings, command: str, paint: _Paint) -> st
 
 
 def _sphere(name: str, sphere: Sphere, paint: _Paint) -> str:
-    diffuse = 0.0 if _holds(sphere, LIGHT) else sphere.diffuse
+    diffuse = 0.0 if holds(sphere, LIGHT) else sphere.diffuse
     shape = f"SPHERE CENTER {_spaced(sphere.centre)} RAD {number(sphere.radius)}"
     return f"# {name}\n{shape}\n  {paint.texture(sphere, diffuse)}\n"
 
 
 def _plane(name: str, plane: Plane, paint: _Paint, behind: bool, end: float) -> str:
     """A plane, or up to `end` a disk, or a triangle if it is lit `behind`; what is farther away mirrors nothing."""
-    diffuse = plane.diffuse if _is_lit(plane) else 0.0
+    diffuse = plane.diffuse if is_lit(plane) else 0.0
     opacity = 1 if plane.distance_from(LIGHT) else SHADOWLESS
     normal = plane.unit_normal
     foot = [value * plane.distance_from(EYE) + 0.0 for value in normal]  # never -0.0
@@ -310,11 +162,6 @@ def _triangle(plane: Plane, foot: Iterable[float], radius: float) -> str:
     ]
     places = " ".join(f"V{index} {_spaced(corner)}" for index, corner in enumerate(corners))
     return f"STRI {places} " + " ".join(f"N{index} {_spaced(normal)}" for index in range(3))
-
-
-def _cross(a: Iterable[float], b: Iterable[float]) -> Triple:
-    (x, y, z), (u, v, w) = a, b
-    return (y * w - z * v, z * u - x * w, x * v - y * u)
 
 
 def _spaced(values: Iterable[float]) -> str:

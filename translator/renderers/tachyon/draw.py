@@ -3,7 +3,8 @@
     python draw.py scene.dat scene.exr
 
 The scene file is Tachyon's own. Its program reads it in single precision and writes 16 bits a channel; the library
-behind the program computes in double precision and hands over floats, which is all that is added here.
+behind the program computes in double precision and hands over floats, which is all that is added here. Coordinates stay
+the assignment's in the file; `--unit` scales them, since Tachyon's tolerances are absolute (1e-9).
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-LIBRARY = "libtachyon.so.0"
+LIBRARY = "libtachyon.so.0"  # on Debian: of libtachyon-mt-0, which tachyon-bin-nox brings
+RELEASE, MARK = "0.99", b"LIBTACHYON_0.9.9"  # whose tachyon.h this follows, and how its functions are marked
 FULL = 5  # RT_SHADER_FULL
 
 Fields = dict[str, list[float]]
@@ -82,16 +84,23 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {  # what each function takes, after wh
     "rt_ring": (None, c_void_p, c_void_p, Vector, Vector, c_double, c_double),
     "rt_stri": (None, c_void_p, c_void_p, *[Vector] * 6),
     "rt_renderscene": (None, c_void_p),
+    "rt_finalize": (None,),
 }
 
 
 def load_library() -> ctypes.CDLL:
-    """Tachyon's library, ready for use."""
-    tachyon = ctypes.CDLL(LIBRARY)
+    """Tachyon's library. Another release may lay out its structures otherwise, so that it is not even tried."""
+    try:
+        tachyon = ctypes.CDLL(LIBRARY)
+    except OSError as error:
+        raise SystemExit(f"{LIBRARY} is missing; on Debian: apt-get install tachyon-bin-nox ({error})") from None
+    marked = ctypes.CDLL(None).dlvsym
+    marked.restype, marked.argtypes = c_void_p, (c_void_p, c_char_p, c_char_p)
     for name, (result, *arguments) in PROTOTYPES.items():
+        if not marked(tachyon._handle, name.encode(), MARK):
+            raise SystemExit(f"{LIBRARY} is not Debian's Tachyon {RELEASE}: it has no {name}@{MARK.decode()}")
         function = getattr(tachyon, name)
         function.restype, function.argtypes = result, arguments
-    tachyon.rt_initialize(None, None)
     return tachyon
 
 
@@ -103,7 +112,7 @@ def statements(text: str) -> Iterator[tuple[str, Fields]]:
 
 
 class Scene:
-    """A scene in Tachyon. Its tolerances are absolute (1e-9): `unit` is what a length of 1 becomes."""
+    """A scene in Tachyon, where `unit` is what a length of 1 becomes."""
 
     def __init__(self, tachyon: ctypes.CDLL, unit: float) -> None:
         self.tachyon, self.unit = tachyon, unit
@@ -173,18 +182,23 @@ def write(path: Path, image: NDArray[np.float32]) -> None:
 
 def main() -> None:
     """Render the scene file into the picture file."""
+    tachyon = load_library()
     parser = argparse.ArgumentParser(description="Draw a scene of the assignment with Tachyon's library.")
     parser.add_argument("scene", type=Path)
     parser.add_argument("picture", type=Path)
     parser.add_argument("--unit", type=float, default=1.0, help="what a length of 1 becomes")
     parser.add_argument("--threads", type=int, default=0, help="0 for one on each processor")
+    parser.add_argument("--version", action="version", version=f"Tachyon {RELEASE}")
     options = parser.parse_args()
-    tachyon = load_library()
-    say = Message(lambda level, text: print(text.decode()))
+    text = options.scene.read_text(encoding="ascii")
+    if tachyon.rt_initialize(None, None) < 0:
+        raise SystemExit("Tachyon does not start")
+    say = Message(lambda level, text: print(text.decode(), flush=True))
     tachyon.rt_set_ui_message(say)
     scene = Scene(tachyon, options.unit)
-    scene.read(options.scene.read_text(encoding="ascii"))
+    scene.read(text)
     write(options.picture, scene.render(options.threads))
+    tachyon.rt_finalize()
 
 
 if __name__ == "__main__":
