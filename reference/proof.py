@@ -7,6 +7,8 @@ way a ray goes, not even at the highest precision, the pixel is a knife edge and
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -75,12 +77,11 @@ class Prover:
         rays: list[Ray] = []
         complete, exhausted = True, False
         path: list[int] | None = []
-        with precision(bits):
-            tables = self._tables[bits] = self._tables.get(bits) or Tables(self.scene)
+        with self.tables(bits) as tables:
             for _ in range(LARGEST_SET):
                 walk = Walk(tables, rules, path or [], may_choose=last)
                 try:
-                    colour = _rounded(walk.colour(self._direction(column, row), self.depth))
+                    colour = _rounded(walk.colour(self.direction(column, row), self.depth))
                 except UnboundedError:
                     complete = False
                 else:
@@ -98,7 +99,15 @@ class Prover:
         exhausted |= path is not None
         return Admissible(tuple(found), complete and not exhausted, bits, exhausted, tuple(rays))
 
-    def _direction(self, column: int, row: int) -> Point:
+    @contextmanager
+    def tables(self, bits: int) -> Iterator[Tables]:
+        """The scene at so many bits, which are in force meanwhile."""
+        with precision(bits):
+            self._tables[bits] = self._tables.get(bits) or Tables(self.scene)
+            yield self._tables[bits]
+
+    def direction(self, column: int, row: int) -> Point:
+        """From the eye to the middle of a pixel."""
         x = fmpq((2 * column + 1 - self.width) * int(SCREEN), self.width)
         y = fmpq((self.height - 1 - 2 * row) * int(SCREEN), self.height)
         return (arb(x), arb(y), arb(SCREEN_DISTANCE))

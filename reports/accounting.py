@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from reference.proof import Admissible, Colour, Prover
 from reference.rules import DOCUMENT_RULES, Rules
 from reference.scene import Triple
+from reference.witness import find_error
 from reports.metrics import TOLERANCE
 
 KNIFE_EDGE, DOCUMENT_WINDOW = "knife-edge", "document-window"
@@ -20,7 +21,7 @@ PRECISION, LIMIT = "renderer-precision", "declared-limit"
 CLASSES = {
     KNIFE_EDGE: "No precision can decide the pixel, and this is one of the colours that it may have.",
     DOCUMENT_WINDOW: "The colour by the document's text, whose smallest distance is 1e-4 where the truth has none.",
-    PRECISION: "Closer to a branch than the renderer's precision can tell, and the colour on the other side of it.",
+    PRECISION: "The other side of a branch, or a path between mirrors, within the error of the renderer's arithmetic.",
     LIMIT: "The colour without what is closer to the start of a ray, or farther, than the renderer can see.",
 }
 STEPS = (2.0**-8, 2.0**-4, 1.0)  # of the declared precision: the smallest that explains a pixel is named
@@ -69,19 +70,19 @@ def explain_pixel(prover: Prover, limits: Mapping[str, float], column: int, row:
     precision, gap, far = (limits.get(name, 0.0) for name in ("precision", "gap", "far"))
     for kind, sight in ((PRECISION, Rules()), (LIMIT, Rules(gap=gap, far=far))):
         widest = replace(sight, precision=precision)
-        if (kind == LIMIT and not sight.has_leeway) or not _may_hold(prover, column, row, widest, value):
+        if not widest.has_leeway or (kind == LIMIT and not sight.has_leeway):
+            continue
+        found = prover.admissible(column, row, widest)
+        if found.complete and not any(_holds(colour, value) for colour in found.colours):
             continue
         for step in (0.0, *STEPS) if sight.has_leeway else STEPS:
             rules = replace(sight, precision=precision * step)
-            if _explains(prover.admissible(column, row, rules), truth, value, CLOSE):
-                return Reason(kind, _evidence(rules))
+            if not found.proven and _explains(prover.admissible(column, row, rules), truth, value, CLOSE):
+                return Reason(kind, f"the other side of a branch, reached by {_evidence(rules)}")
+        agrees = any(_holds(colour, value) for colour in truth.colours)
+        if kind == PRECISION and not agrees and (error := find_error(prover, column, row, value, precision)):
+            return Reason(kind, f"a path with errors of up to 2^{math.log2(error):.1f} of the coordinates")
     return None
-
-
-def _may_hold(prover: Prover, column: int, row: int, rules: Rules, value: Triple) -> bool:
-    """Whether the widest leeway leads anywhere near: it must open a branch, and hold the value."""
-    found = prover.admissible(column, row, rules)
-    return not found.complete or (len(found.colours) > 1 and any(_holds(colour, value) for colour in found.colours))
 
 
 def _explains(other: Admissible, truth: Admissible, value: Triple, tolerance: float) -> bool:
@@ -111,4 +112,4 @@ def _evidence(rules: Rules) -> str:
     sight += [f"farther than {rules.far:g} from it"] if rules.far else []
     parts = [f"missing what is {' or '.join(sight)}"] if sight else []
     parts += [f"an error of 2^{math.log2(rules.precision):g} of the coordinates"] if rules.precision else []
-    return f"the other side of a branch, reached by {' and '.join(parts)}"
+    return " and ".join(parts)
