@@ -306,3 +306,11 @@ def test_renderer_without_its_program_is_not_installed(monkeypatch: pytest.Monke
     outcome = run_renderer("povray", EMPTY, SETTINGS)
     installed_version.cache_clear()
     assert (outcome.status, outcome.reason) == ("not-installed", "not installed; to have it: apt-get install povray")
+
+
+def test_mitsuba_misses_a_slanting_plane_whose_own_directions_rays_have() -> None:
+    """A grey plane through the eye holds a diagonal of pixels; they show the red wall, in light or in shadow."""
+    grey, wall = "99 99 99\n0 0 0\n1 1 0\n1\n0\n", "190 51 83\n0 0 800\n0 0 -1\n0.7\n0\n"
+    scene = parse(f"255 255 255\n0.1\n0\n2\n{grey}{wall}")
+    red, green, _ = rendered_by("mitsuba", scene, 64, 64).diagonal()
+    assert red == pytest.approx(green * 190 / 51, rel=1e-3)

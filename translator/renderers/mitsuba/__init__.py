@@ -28,6 +28,7 @@ TIMING = r"traced in ([0-9.e-]+) s"
 
 MIRROR_SHARE = 1 - 2.0**-23  # of the blended BSDF: the rest is the smallest share that float32 keeps apart
 PLANE_RADIUS = 1e9  # a plane is a disk of this radius
+BESIDE = 1 + 2.0**-20  # stretches the picture where rays run within a plane through the eye: by rounding they meet it
 # Single precision, as it adds up in interval arithmetic; rays start ahead by 1e-4 of the way to the light.
 LIMITS = Limits(precision=2.0**-20, gap=0.1, far=0.9 * PLANE_RADIUS)
 # What single precision carries, found by comparing pictures.
@@ -107,7 +108,7 @@ def export(scene: Scene, settings: Settings) -> Export:
         command=" ".join(command),
         source=source(scene, "     "),
         depth=settings.depth,
-        stretch=settings.width / settings.height,
+        stretch=settings.width / settings.height * (BESIDE if any(map(_slants_through_eye, planes.values())) else 1),
         fov=math.degrees(2 * math.atan(SCREEN / SCREEN_DISTANCE)),
         distance=SCREEN_DISTANCE,
         width=settings.width,
@@ -168,6 +169,10 @@ def _refuse_close_pairs(spheres: dict[str, Sphere], planes: dict[str, Plane]) ->
         turned = math.dist(normal, [sign * value for value in other_normal])
         if turned < APART / SCREEN and abs(plane.distance_from(EYE) - sign * other_plane.distance_from(EYE)) < APART:
             raise Unsupported(f"{COARSE} to tell {name} from {other_name}")
+
+
+def _slants_through_eye(plane: Plane) -> bool:
+    return sum(map(bool, plane.normal)) > 1 and not plane.distance_from(EYE)
 
 
 def _surface(name: str, shape: str, geometry: str, surface: Sphere | Plane, light: list[float]) -> str:
