@@ -4,12 +4,13 @@ VENV := .venv
 PYTHON ?= python3
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+CYCLES := $(VENV)/.cycles
 HAS_VENV := $(PYTHON) -c 'import ensurepip; import venv'
 HAS_ATOMIC := $(PYTHON) -c 'import ctypes; ctypes.CDLL("libatomic.so.1")'
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help report test lint bench soundness docs pictures lock renderers browser clean
+.PHONY: help report test lint bench soundness docs pictures lock renderers cycles browser clean
 
 help:  ## Say what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -17,7 +18,7 @@ help:  ## Say what can be made
 report: $(READY) renderers  ## Draw the four examples in every renderer there is and write out/report.html
 	@$(BIN)/crossray check --out out || test $$? -eq 1  # 1: the report is written and something disagrees
 
-test: $(READY) renderers browser lint  ## Check style and types, run the tests
+test: $(READY) renderers cycles browser lint  ## Check style and types, run the tests
 	$(BIN)/python -m pytest
 
 lint: $(READY)
@@ -53,6 +54,11 @@ $(READY): requirements.txt pyproject.toml
 renderers:
 	@command -v povray >/dev/null || $(call debian,povray,povray)
 	@command -v tachyon >/dev/null || $(call debian,tachyon-bin-nox,tachyon)
+
+cycles: $(READY)  ## Install Blender Cycles too (374 MB, Python 3.11 only), or say why not and go on
+	@test -f $(CYCLES) && test $(CYCLES) -nt requirements-cycles.txt || { echo "installing Blender Cycles"; \
+		$(BIN)/python -m pip install --quiet --no-deps --require-hashes --only-binary :all: -r requirements-cycles.txt \
+		&& touch $(CYCLES); } || echo "missing: Blender Cycles, without which the rest works" >&2
 
 browser:
 	@command -v chromium >/dev/null || $(call debian,chromium,chromium)
