@@ -35,6 +35,7 @@ MOST_THREADS = 1024
 DEEPEST = 50  # bounces
 FARTHEST = 1e6  # of a sphere
 FARTHEST_PLANE = 1e8
+LARGEST_RADIUS = 5000
 
 HEADER = """\
 # {title}
@@ -131,6 +132,9 @@ def _refuse_colours(name: str, surface: Sphere | Plane, light: list[float], boun
 def _refuse_sphere(name: str, sphere: Sphere, settings: Settings) -> None:
     if max(map(abs, sphere.centre)) + sphere.radius > FARTHEST:
         raise Unsupported(f"Cycles' single precision is too coarse beyond {FARTHEST:g}: {name} reaches farther")
+    if sphere.radius > LARGEST_RADIUS:
+        over = f"over {LARGEST_RADIUS}: {name} has {sphere.radius:g}"
+        raise Unsupported(f"Cycles' single precision is too coarse for a radius {over}")
     if holds_light(sphere):
         raise Unsupported(f"Cycles decides by rounding whether {name} hides the light, which lies on it")
     x, y, _ = sphere.centre
