@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from importlib import resources
+from itertools import combinations
 
 from reference.scene import (
     EYE,
@@ -28,21 +29,27 @@ TIMING = r"traced in ([0-9.e-]+) s"
 
 FAR = 2.0**29  # Cycles loses what is farther away by twice that
 LIMITS = Limits(precision=2.0**-20, far=FAR)  # single precision, as it adds up in interval arithmetic
+# What single precision carries, found by comparing pictures.
+COARSE = "Cycles' single precision is too coarse"
+FARTHEST = 1e6  # of a sphere
+FARTHEST_PLANE = 1e8
+LARGEST_RADIUS = 5000
+MOST_BALLS = 20  # that mirror each other: each magnifies the error, and more ways lead between more of them
+APART = 1e-3  # between surfaces that look alike
+
+# What Blender and Cycles allow.
 FAINTEST = 1e-5  # CLOSURE_WEIGHT_CUTOFF: Cycles leaves out what has a smaller coefficient
 SMALLEST_SIDE = 4  # pixels
 NARROWEST = 200  # pixels that are so many times as wide as high, or as high as wide
 MOST_THREADS = 1024
-DEEPEST = 50  # bounces
-FARTHEST = 1e6  # of a sphere
-FARTHEST_PLANE = 1e8
-LARGEST_RADIUS = 5000
+DEEPEST = 50  # bounces: each is drawn by itself
 
 HEADER = """\
 # {title}
 # Run: {command}
 # or with Blender 5 itself:
-#   blender --background --python scene.py    draws scene.exr
-#   blender --python scene.py                 shows the scene; F12 draws it
+#   blender --background --python scene.py -- scene.exr
+#   blender --python scene.py    shows the scene; F12 draws it
 # The picture is linear: 1.0 is level 255. The scene as the assignment writes it:
 #
 {source}
@@ -92,7 +99,10 @@ def export(scene: Scene, settings: Settings) -> Export:
     for name, plane in planes.items():
         if abs(plane.distance_from(EYE)) > FARTHEST_PLANE:
             raise Unsupported(f"Cycles sees nothing beyond {FAR:g}, where rays along {name} would meet it")
-    command = (PYTHON, "scene.py")
+    _refuse_close_pairs(spheres, planes)
+    if bounces:
+        _refuse_mirrors(spheres, planes, bounces)
+    command = (PYTHON, "scene.py", "scene.exr")
     header = HEADER.format(
         title="A scene of the recursive ray tracing assignment, for Blender 5.0 and its renderer Cycles",
         command=" ".join(command),
@@ -131,16 +141,39 @@ def _refuse_colours(name: str, surface: Sphere | Plane, light: list[float], boun
 
 def _refuse_sphere(name: str, sphere: Sphere, settings: Settings) -> None:
     if max(map(abs, sphere.centre)) + sphere.radius > FARTHEST:
-        raise Unsupported(f"Cycles' single precision is too coarse beyond {FARTHEST:g}: {name} reaches farther")
+        raise Unsupported(f"{COARSE} beyond {FARTHEST:g}: {name} reaches farther")
     if sphere.radius > LARGEST_RADIUS:
         over = f"over {LARGEST_RADIUS}: {name} has {sphere.radius:g}"
-        raise Unsupported(f"Cycles' single precision is too coarse for a radius {over}")
+        raise Unsupported(f"{COARSE} for a radius {over}")
     if holds_light(sphere):
         raise Unsupported(f"Cycles decides by rounding whether {name} hides the light, which lies on it")
     x, y, _ = sphere.centre
     start = (_nearest_pixel(x, settings.width), _nearest_pixel(y, settings.height), SCREEN_DISTANCE)
     if math.dist(start, sphere.centre) <= sphere.radius:
         raise Unsupported(f"Cycles' spheres have no inside: rays of the camera, from the screen, start in {name}")
+
+
+def _refuse_mirrors(spheres: dict[str, Sphere], planes: dict[str, Plane], bounces: int) -> None:
+    balls = sum(sphere.reflection != 0 for sphere in spheres.values())
+    if bounces > 1 and balls > MOST_BALLS:
+        raise Unsupported(f"{COARSE} for {bounces} bounces between {balls} mirroring spheres (at most {MOST_BALLS})")
+    through_eye = [name for name, plane in planes.items() if not plane.distance_from(EYE)]
+    if len(through_eye) > 1 and any(planes[name].reflection for name in through_eye):
+        edge = " and ".join(through_eye[:2])
+        raise Unsupported(f"Cycles decides by rounding what mirrors show on the line through the eye where {edge} meet")
+
+
+def _refuse_close_pairs(spheres: dict[str, Sphere], planes: dict[str, Plane]) -> None:
+    """Surfaces that single precision cannot tell apart."""
+    for (name, one), (other_name, other) in combinations(spheres.items(), 2):
+        if math.dist(one.centre, other.centre) + abs(one.radius - other.radius) < APART:
+            raise Unsupported(f"{COARSE} to tell {name} from {other_name}")
+    for (name, plane), (other_name, other_plane) in combinations(planes.items(), 2):
+        cosine = sum(a * b for a, b in zip(plane.unit_normal, other_plane.unit_normal, strict=True))
+        side = math.copysign(1, cosine)
+        turned = math.dist(plane.unit_normal, [side * value for value in other_plane.unit_normal])
+        if turned < APART / SCREEN and abs(plane.distance_from(EYE) - side * other_plane.distance_from(EYE)) < APART:
+            raise Unsupported(f"{COARSE} to tell {name} from {other_name}")
 
 
 def _nearest_pixel(place: float, pixels: int) -> float:

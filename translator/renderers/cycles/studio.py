@@ -34,7 +34,7 @@ def studio(width, height, bounces, threads):
     scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = max(1, height / width), max(1, width / height)
     scene.render.threads_mode, scene.render.threads = "FIXED", threads
     scene.render.dither_intensity = 0
-    scene.render.filepath = "scene.exr"
+    scene.render.filepath = sys.argv[-1] if sys.argv[-1].endswith(".exr") else "scene.exr"
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_mode = "RGB"
     scene.render.image_settings.color_depth = "32"
