@@ -22,7 +22,7 @@ from reference.scene import (
 from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single, source
 
 TITLE = "Blender Cycles"
-LICENCE = "GPL-2.0-or-later AND Apache-2.0"  # of Blender and of Cycles in it
+LICENCE = "GPL-3.0-or-later"
 INSTALL = "pip install 'crossray[cycles]' (374 MB, for Python 3.11 only)"
 VERSION = ((PYTHON, "-c", "import importlib.metadata as m; print('bpy', m.version('bpy'))"), r"bpy (\S+)")
 TIMING = r"traced in ([0-9.e-]+) s"
