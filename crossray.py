@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import io
 import os
 import re
 import signal
@@ -20,7 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from typer.core import TyperCommand
 
-from reference.errors import CrossrayError, FailureError, InputError, SceneWarning
+from reference.errors import CrossrayError, FailureError, InputError, SceneWarning, plain
 from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
 
 if TYPE_CHECKING:
@@ -203,7 +204,9 @@ def export(
             print(f"{name}: not exported: {reason}", file=sys.stderr)
             continue
         write_export(exported, output / name)
-        _print(f"(cd -- {shlex.quote(str(output / name))} && {command_line(exported)})")
+        folder = output / name
+        place = str(folder) if folder.is_absolute() else f"./{folder}"  # CDPATH cannot lead elsewhere
+        _print(f"(cd -- {shlex.quote(place)} && {command_line(exported)})")
         for note in exported.notes if verbose else ():
             print(f"{name}: {note}", file=sys.stderr)
     if refused and refused == len(names):
@@ -419,6 +422,8 @@ def main() -> None:
     """The console script."""
     for number in SIGNALS:
         signal.signal(number, _stop)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="surrogateescape")  # file names can be any bytes
     try:
         app()
     except InputError as error:
@@ -444,7 +449,7 @@ def _stop(number: int, frame: object) -> None:
 
 
 def _fail(message: str, code: int) -> None:
-    print(message, file=sys.stderr)
+    print(plain(message), file=sys.stderr)
     sys.exit(code)
 
 
@@ -503,7 +508,7 @@ def _ending(outcome: Outcome) -> str:
 
 def _say(text: str, quiet: bool = False) -> None:
     if not quiet:
-        print(text, file=sys.stderr)
+        print(plain(text), file=sys.stderr)
 
 
 def _version() -> str:

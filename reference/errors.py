@@ -50,3 +50,8 @@ class RendererError(FailureError):
     def __init__(self, message: str, log: str = "") -> None:
         super().__init__(message)
         self.log = log
+
+
+def plain(message: str) -> str:
+    """One line that no terminal takes for a command: names of files and what renderers say can hold anything."""
+    return "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in message)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from reference.errors import plain
 from reports.page import outcome
 
 
@@ -15,9 +16,9 @@ def summary_lines(results: dict[str, Any]) -> Iterator[str]:
     for scene in results["scenes"]:
         reference = scene["reference"]
         if reference["status"] != "rendered":
-            yield f"{scene['scene']}  {reference['renderer']}  {reference['status']}: {reference['reason']}"
+            yield plain(f"{scene['scene']}  {reference['renderer']}  {reference['status']}: {reference['reason']}")
         for picture in scene["comparisons"]:
-            yield f"{scene['scene']}  {picture['renderer']}  {outcome(picture)}: {_finding(picture)}"
+            yield plain(f"{scene['scene']}  {picture['renderer']}  {outcome(picture)}: {_finding(picture)}")
 
 
 def _finding(picture: dict[str, Any]) -> str:
@@ -36,7 +37,7 @@ def progress_lines(quiet: bool, verbose: bool, totals: Mapping[str, int]) -> Ite
     Call it, from any thread, with a name, what it does, and how many steps of it that completes.
     """
     if quiet or not sys.stderr.isatty():
-        yield lambda name, text, done: _tell(f"{name}: {text}\n") if verbose and not quiet else None
+        yield lambda name, text, done: _tell(plain(f"{name}: {text}") + "\n") if verbose and not quiet else None
         return
     from rich.console import Console
     from rich.markup import escape
@@ -55,7 +56,7 @@ def progress_lines(quiet: bool, verbose: bool, totals: Mapping[str, int]) -> Ite
         def show(name: str, text: str, done: int) -> None:
             task = tasks[name]
             bars.start_task(task)
-            bars.update(task, description=escape(text), advance=done)
+            bars.update(task, description=escape(plain(text)), advance=done)
 
         yield show
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import time
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, InvalidStateError, ThreadPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from queue import SimpleQueue
+from threading import Event
+from typing import Any
 
 from reference.scene import Scene
 from translator.contract import Settings
@@ -35,8 +39,10 @@ def run_jobs(jobs: Sequence[Job], report: Callable[[Job, Outcome | None], None])
     """Draw as many at a time as there are cores, each on its share of them. Yields the outcomes in the order of `jobs`.
 
     `report` is called from other threads as a job begins, with None, and as it ends. When the iterator is closed or
-    an exception passes through it, every renderer is stopped and nothing of them is left.
+    an exception passes through it, one from `report` too, every renderer is stopped and nothing of them is left.
     """
+    ending = Event()
+    broken: Future[None] = Future()  # never done well
     free: SimpleQueue[list[int]] = SimpleQueue()
     shares = share_cores(usable_cores(), len(jobs))
     for share in shares:
@@ -45,6 +51,8 @@ def run_jobs(jobs: Sequence[Job], report: Callable[[Job, Outcome | None], None])
     def work(job: Job) -> Outcome:
         share = free.get()
         try:
+            if ending.is_set():
+                raise CancelledError
             if hasattr(os, "sched_setaffinity"):
                 os.sched_setaffinity(0, share)  # of this thread, and so of the processes that it starts
             report(job, None)
@@ -52,8 +60,19 @@ def run_jobs(jobs: Sequence[Job], report: Callable[[Job, Outcome | None], None])
             outcome = run_renderer(job.renderer, job.scene, settings, job.timeout)
             report(job, outcome)
             return outcome
+        except BaseException as error:
+            with suppress(InvalidStateError):  # another one was first
+                broken.set_exception(error)
+            raise
         finally:
             free.put(share)
+
+    def first() -> Outcome:
+        either: list[Future[Any]] = [pending[0], broken]
+        wait(either, return_when=FIRST_COMPLETED)
+        if broken.done():
+            broken.result()
+        return pending.popleft().result()
 
     pending: deque[Future[Outcome]] = deque()
     pool = ThreadPoolExecutor(len(shares))
@@ -61,13 +80,15 @@ def run_jobs(jobs: Sequence[Job], report: Callable[[Job, Outcome | None], None])
         for job in jobs:
             pending.append(pool.submit(work, job))
             if len(pending) > AHEAD * len(shares):
-                yield pending.popleft().result()
+                yield first()
         while pending:
-            yield pending.popleft().result()
+            yield first()
     finally:
+        ending.set()
         pool.shutdown(wait=False, cancel_futures=True)
-        while wait(pending, timeout=0.05).not_done:
+        while free.qsize() < len(shares):
             stop_all()  # again and again, as a job may be between two processes
+            time.sleep(0.01)
         pool.shutdown()
 
 

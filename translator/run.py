@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import shutil
 import sys
 import tempfile
 import time
@@ -23,7 +22,7 @@ from reference.files import make_folder, write_text
 from reference.image import read_image
 from reference.scene import Scene
 from translator.contract import PYTHON, Export, Settings, Unsupported
-from translator.process import run_process
+from translator.process import find_program, run_process
 from translator.registry import adapter
 
 RENDERED, UNSUPPORTED, NOT_INSTALLED, FAILED = "rendered", "unsupported", "not-installed", "failed"
@@ -70,6 +69,8 @@ def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 6
         return replace(outcome, status=UNSUPPORTED, reason=str(refusal))
     except RendererError as error:
         return replace(outcome, reason=str(error), log=error.log)
+    except OSError as error:
+        return replace(outcome, reason=str(error))
     outcome = replace(outcome, command=command_line(export), notes=export.notes, limits=asdict(export.limits))
     start = time.perf_counter()
     try:
@@ -134,7 +135,8 @@ def write_export(export: Export, folder: str | Path) -> None:
 
 def command_line(export: Export) -> str:
     """The line to type in the folder of the export."""
-    return shlex.join(_resolve(export.command))
+    settings = [f"{name}={shlex.quote(value)}" for name, value in export.environment.items()]
+    return " ".join([*settings, shlex.join(_resolve(export.command))])
 
 
 @cache
@@ -145,7 +147,7 @@ def installed_version(name: str) -> str | None:
         try:
             answer = run_process(_resolve(command), Path(folder), {}, LONGEST_VERSION)
         except RendererError:
-            return "unknown" if command[0] != PYTHON and shutil.which(command[0]) else None
+            return "unknown" if command[0] != PYTHON and find_program(command[0]) else None
     match = re.search(pattern, answer)
     return match[1] if match else "unknown"
 

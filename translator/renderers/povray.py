@@ -58,6 +58,10 @@ camera {{
 light_source {{ {light}*Unit, rgb 1 }}
 """
 
+INI = """\
+; POV-Ray reads this file in place of your own povray.ini and the system's: none of their settings changes the picture.
+"""
+
 
 def export(scene: Scene, settings: Settings) -> Export:
     """One `.pov` file. Each surface: ambient and diffuse from its colour, the given normal on both sides, a mirror."""
@@ -81,8 +85,9 @@ def export(scene: Scene, settings: Settings) -> Export:
     parts = [header]
     parts += [_sphere(name, sphere) for name, sphere in spheres.items()]
     parts += [_plane(name, plane) for name, plane in planes.items()]
+    files = {"scene.pov": "\n".join(parts), "povray.ini": INI}
     notes = ("The picture is a 16 bit PNG with linear values; viewers that honour its gamma show it brighter.",)
-    return Export({"scene.pov": "\n".join(parts)}, command, "scene.png", notes, limits=LIMITS)
+    return Export(files, command, "scene.png", notes, {"POVINI": "povray.ini"}, LIMITS)
 
 
 def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:
