@@ -33,6 +33,15 @@ def check_format(path: str | Path) -> None:
     """Raise InputError unless the name of the file tells a format that can be written."""
     if Path(path).suffix.lower() not in FORMATS:
         raise InputError(f"{path}: expected a picture name ending in {', '.join(FORMATS)}")
+    _check_name(path)
+
+
+def _check_name(path: str | Path) -> None:
+    """OpenImageIO takes no other names; the folder's counts too."""
+    try:
+        os.path.realpath(path).encode()
+    except UnicodeEncodeError as error:
+        raise InputError(f"{path}: expected a path in UTF-8 for a picture") from error
 
 
 def write_image(path: str | Path, levels: Picture) -> None:
@@ -96,6 +105,7 @@ def read_image(path: str | Path) -> Picture:
         raise InputError(
             f"{path}:1:1: expected a picture, found {'a directory' if Path(path).is_dir() else 'no such file'}"
         )
+    _check_name(path)
     source = oiio.ImageInput.open(str(path))
     if source is None:
         oiio.geterror()

@@ -66,7 +66,7 @@ def test_every_failure_is_told_and_the_rest_is_done(tmp_path: Path) -> None:
         "forgets": "echo nothing to do",
         "shrinks": f"echo a small one; cp {tmp_path}/small.png scene.png",
         "is-missing": "exec /nonexistent/program",
-        "talks": "yes abcdefghijklmnopqrstuvwxyz | head -c 300000; echo the end; exit 9",
+        "talks": "yes abcdefghijklmnopqrstuvwxyz | head -c 270000; echo the end; exit 9",
     }
     environment = offer(tmp_path / "fakes", scripts) | {"TMPDIR": str(tmp_path / "tmp")}
     found = check(["native", *scripts], tmp_path / "out", environment, timeout=8)
@@ -142,7 +142,7 @@ def test_a_full_disk(tmp_path: Path) -> None:
 
 def test_a_limit_that_the_user_has_set_stays(tmp_path: Path) -> None:
     """An unprivileged process cannot raise it, and must not fail for trying."""
-    environment = offer(tmp_path / "fakes", {"tells": "ulimit -H -f; ulimit -H -c; exit 1"})
+    environment = offer(tmp_path / "fakes", {"tells": "sleep 0.5; ulimit -H -f; ulimit -H -c; exit 1"})
     limit = 64 << 20
     drop = ["setpriv", "--bounding-set=-sys_resource", "--inh-caps=-sys_resource"] if os.geteuid() == 0 else []
     before = drop if drop and shutil.which(drop[0]) else []

@@ -1,5 +1,6 @@
 """Being stopped leaves no process and no file behind."""
 
+import json
 import os
 import signal
 import subprocess
@@ -7,8 +8,13 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from fakes import are_gone, hang, offer, wait_for
 from helpers import EXAMPLE
+
+from reference.image import write_image
+from translator.process import usable_cores
 
 RENDERER = """\
 #!/bin/sh
@@ -44,3 +50,57 @@ def test_being_stopped_leaves_nothing_behind(number: signal.Signals, tmp_path: P
         os.kill(int(started.read_text()), 0)
     assert not list(folders["tmp"].iterdir())
     assert not list(folders["out"].rglob(".crossray-*"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_being_stopped_twice_with_much_to_do(number: signal.Signals, tmp_path: Path) -> None:
+    """Several renderers hang and ignore all they can, one of them when it is asked for its version; more are queued."""
+    count = min(len(usable_cores()), 2)
+    notes = [tmp_path / f"note{place}" for place in range(3)]
+    names = [f"hang{place}" for place in range(9)]
+    scripts = {name: hang(note) for name, note in zip(names, [*notes, *[tmp_path / "more"] * 6], strict=True)}
+    environment = offer(tmp_path / "fakes", scripts, {"hang1": hang(notes[1])})
+    with checking(tmp_path, environment, "--with", ",".join(names)) as process:
+        processes = wait_for(*notes[:count])
+        for _ in range(2):
+            process.send_signal(number)
+        start = time.monotonic()
+        _, errors = process.communicate(timeout=20)
+        assert time.monotonic() - start < 5
+    assert (process.returncode, errors) == (128 + number, "interrupted\n")
+    assert len(processes) == 2 * count
+    assert are_gone(processes)
+    assert_nothing_is_left(tmp_path)
+
+
+def test_being_stopped_while_comparing(tmp_path: Path) -> None:
+    write_image(tmp_path / "black.png", np.zeros((8, 8, 3)))
+    names = [f"black{place}" for place in range(6)]
+    environment = offer(tmp_path / "fakes", dict.fromkeys(names, f"cp {tmp_path}/black.png scene.png"))
+    with checking(tmp_path, environment, "--verbose", "--with", ",".join(names)) as process:
+        assert process.stderr
+        said = [process.stderr.readline()]
+        while not said[-1].startswith("comparing: "):
+            assert said[-1]
+            said.append(process.stderr.readline())
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert errors.endswith("interrupted\n")
+    assert "Traceback" not in errors
+    (scene,) = json.loads((tmp_path / "out/run.json").read_text(encoding="utf-8"))["scenes"]
+    assert [picture["status"] for picture in scene["pictures"]] == ["rendered"] * 7
+    assert not (tmp_path / "out/report.json").exists()
+    assert_nothing_is_left(tmp_path)
+
+
+def checking(folder: Path, environment: dict[str, str], *words: str) -> subprocess.Popen[str]:
+    (folder / "tmp").mkdir()
+    command = [sys.executable, "-m", "crossray", "check", str(EXAMPLE), "--size", "8x8", "--out", str(folder / "out")]
+    environment = environment | {"TMPDIR": str(folder / "tmp")}
+    return subprocess.Popen([*command, *words], env=environment, stderr=subprocess.PIPE, text=True)
+
+
+def assert_nothing_is_left(folder: Path) -> None:
+    assert not list((folder / "tmp").iterdir())
+    assert not list((folder / "out").rglob(".crossray-*"))

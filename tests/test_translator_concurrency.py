@@ -89,7 +89,9 @@ def test_outcomes_come_in_the_order_of_the_jobs(
     said: list[tuple[str, str | None]] = []
     waits = ["0.4", "0.01", "0.2", "0.01", "0.1", "0.01", "0.01"]
     todo = jobs(*(f"sleep {seconds}; echo I am {place}; exit 3" for place, seconds in enumerate(waits)))
-    outcomes = list(run_jobs(todo, lambda job, outcome: said.append((job.renderer, outcome and outcome.status))))
+    outcomes = list(
+        run_jobs(todo, lambda job, outcome: said.append((job.renderer, outcome.status if outcome else None)))
+    )
     assert [outcome.renderer for outcome in outcomes] == [job.renderer for job in todo]
     assert [outcome.log for outcome in outcomes] == [f"I am {place}\n" for place in range(7)]
     assert {outcome.reason for outcome in outcomes} == {f"it failed with exit code 3: I am {p}" for p in range(7)}
@@ -139,8 +141,13 @@ def test_a_slow_first_job_bounds_how_much_is_drawn_ahead(
     on_cores(2)
     go = tmp_path / "go"
     begun: list[str] = []
+
+    def report(job: Job, outcome: Outcome | None) -> None:
+        if outcome is None:
+            begun.append(job.renderer)
+
     todo = jobs(f"until [ -e {go} ]; do sleep 0.01; done", *["exit 1"] * 11)
-    with closing(run_jobs(todo, lambda job, outcome: outcome or begun.append(job.renderer))) as outcomes:
+    with closing(run_jobs(todo, report)) as outcomes:
         threading.Timer(1.0, go.touch).start()
         assert next(outcomes).renderer == "0"
         assert len(begun) <= 2 * AHEAD + 1, begun
@@ -216,7 +223,12 @@ def test_a_version_question_that_hangs_can_be_stopped(
 ) -> None:
     on_cores(1)
     note = tmp_path / "note"
-    threading.Thread(target=lambda: (wait_for(note), os.kill(os.getpid(), signal.SIGINT))).start()
+
+    def interrupt() -> None:
+        wait_for(note)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         list(run_jobs(jobs("exit 1", "exit 1", version=hang(note)), silent))
