@@ -120,7 +120,7 @@ def hostile_environment(world: Path) -> dict[str, str]:
     shutil.copy(work / "rayinit.cal", outside)
     return plain_environment() | {
         "HOME": str(home),
-        "PATH": os.pathsep.join(["", ".", "../relative", os.environ["PATH"], ""]),
+        "PATH": os.pathsep.join([".", "../relative", "", os.environ["PATH"]]),
         "POVINI": str(outside / "povray.ini"),
         "POVINC": str(outside),
         "RAYPATH": f".:{outside}",
@@ -154,7 +154,7 @@ def hostile_environment(world: Path) -> dict[str, str]:
 
 def run(words: list[str], environment: dict[str, str], folder: Path) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(words, env=environment, cwd=folder, capture_output=True, timeout=120, check=False)
-    said = (text.decode("utf-8", "surrogateescape") for text in (done.stdout, done.stderr))  # with every \\r
+    said = (text.decode("utf-8", "surrogateescape") for text in (done.stdout, done.stderr))  # line ends as they are
     return subprocess.CompletedProcess(done.args, done.returncode, *said)
 
 
