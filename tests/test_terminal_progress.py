@@ -4,15 +4,21 @@ import fcntl
 import os
 import pty
 import re
+import signal
 import struct
+import subprocess
 import sys
 import termios
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
+from fakes import are_gone, hang, offer, wait_for
+from helpers import EXAMPLE
 
 from reports.terminal import progress_lines, summary_lines
 
@@ -144,3 +150,27 @@ def test_a_summary_line_is_one_line_whatever_is_in_it() -> None:
     lines = list(summary_lines({"scenes": [scene]}))
     assert len(lines) == 2
     assert all(line.isprintable() and "failed: bad: " in line for line in lines)
+
+
+def test_being_stopped_leaves_the_terminal_as_it_was(tmp_path: Path) -> None:
+    """The whole command, with its standard error on a terminal; the renderers do not belong to that terminal."""
+    notes = [tmp_path / "note"]
+    environment = offer(tmp_path / "fakes", {"hangs": f"tty </dev/tty; {hang(notes[0])}"})
+    screen = Screen()
+    with subprocess.Popen(
+        [sys.executable, "-m", "crossray", "check", str(EXAMPLE), "--with", "hangs", "--size", "8x8", "--out", "out"],
+        env=environment | {"TERM": "xterm", "COLUMNS": str(COLUMNS)},
+        stderr=screen.slave,
+        cwd=tmp_path,
+    ) as process:
+        processes = wait_for(*notes)
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 130
+    text = screen.text()
+    assert are_gone(processes)
+    drawn = [frame for frame in frames(text) if len(frame) > 1]
+    assert [line.split()[0] for line in drawn[-1]] == ["certified", "hangs", "comparing"]
+    assert any(re.fullmatch(r"hangs .* 0/1 \d:\d\d:\d\d .*example1.txt", frame[1]) for frame in drawn)
+    assert text.rindex("\x1b[?25h") > text.rindex("\x1b[?25l")
+    assert text.endswith("interrupted\r\n")

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -243,3 +244,25 @@ def test_time_outs_are_of_each_job(on_cores: Callable[[int], None], jobs: Callab
     assert time.monotonic() - start < QUICKLY
     reasons = [outcome.reason for outcome in outcomes]
     assert reasons == ["it ran out of time (1 s)", *["it failed with exit code 1"] * 2]
+
+
+def test_no_place_for_temporary_files_is_a_failure_of_each_job(
+    jobs: Callable[..., list[Job]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    outcomes = list(run_jobs(jobs("exit 1", "exit 1"), silent))
+    assert [outcome.status for outcome in outcomes] == ["failed", "failed"]
+    assert all("No such file or directory" in (outcome.reason or "") for outcome in outcomes)
+
+
+def test_a_process_that_gets_away_holds_nothing_up(jobs: Callable[..., list[Job]], tmp_path: Path) -> None:
+    """One in a session of its own is out of reach; it keeps the log open."""
+    note = tmp_path / "note"
+    script = f"setsid sh -c 'echo $$ > {note}.part; mv {note}.part {note}; sleep 60' & "
+    script += f"until [ -e {note} ]; do sleep 0.01; done; echo done; exit 1"
+    start = time.monotonic()
+    (outcome,) = run_jobs(jobs(script), silent)
+    assert time.monotonic() - start < QUICKLY
+    for process in wait_for(note):
+        os.killpg(process, signal.SIGKILL)
+    assert outcome.log == "done\n"

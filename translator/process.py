@@ -17,7 +17,7 @@ from reference.errors import RendererError
 
 KEPT_LOG = 64 * 1024  # bytes, from the end
 LARGEST_FILE = 8 << 30  # bytes that a program may write into one file
-LONGEST_ENDING = 5.0  # seconds to wait for the end of what an ended process said
+LONGEST_ENDING = 2.0  # seconds to wait for the end of what an ended process said
 KEPT_VARIABLES = ("DRJIT_LIBLLVM_PATH",)  # which LLVM the user chose
 
 _running: set[subprocess.Popen[bytes]] = set()
@@ -97,6 +97,8 @@ def stop_all() -> None:
 
 def _bound(process: int, kind: int, largest: int) -> None:
     """Lower a limit of a process; a lower one that the user has set stays."""
+    if not hasattr(resource, "prlimit"):  # only Linux has it
+        return
     with suppress(ProcessLookupError):
         known = [limit for limit in resource.prlimit(process, kind) if limit != resource.RLIM_INFINITY]
         limit = min([largest, *known])
