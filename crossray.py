@@ -420,12 +420,14 @@ def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
 
 def main() -> None:
     """The console script."""
-    for number in SIGNALS:
-        signal.signal(number, _stop)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="surrogateescape")  # file names can be any bytes
     try:
+        for number in SIGNALS:
+            signal.signal(number, _stop)
         app()
+    except _Stopped as stop:
+        _fail("interrupted", SIGNALLED + stop.number)
     except InputError as error:
         _fail(str(error), BAD_INPUT)
     except CrossrayError as error:
@@ -441,11 +443,17 @@ def main() -> None:
         _fail("this is a mistake in crossray, please report it", NOT_DONE)
 
 
+class _Stopped(BaseException):
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
 def _stop(number: int, frame: object) -> None:
     """End as on an error: what was begun is cleared away, what was finished stays. Nothing can interrupt that."""
     for other in SIGNALS:
         signal.signal(other, signal.SIG_IGN)
-    _fail("interrupted", SIGNALLED + number)
+    raise _Stopped(number)
 
 
 def _fail(message: str, code: int) -> None:
