@@ -56,6 +56,7 @@ class Export:
     """A scene in a renderer's own language.
 
     `command` is run in a folder that holds `files` and leaves the picture `image` there: linear, levels / 255.
+    `environment` is set for it, in the line that people type too.
     `notes` tell a reader what is not obvious about the files.
     """
 
