@@ -33,6 +33,7 @@ from translator.run import command_line, installed_version, write_export
 
 ALWAYS = ("mitsuba", "native", "povray", "tachyon")  # in continuous integration
 SIZE = 16
+NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?")
 CROSSRAY = [sys.executable, "-P", "-m", "crossray"]
 ESCAPE = "\x1b]0;mine\x07"
 NAMES = {
@@ -197,7 +198,7 @@ def test_a_hostile_world_changes_no_picture_and_is_not_touched(tmp_path: Path, p
     for name, picture in drawn.items():
         np.testing.assert_array_equal(picture, peaceful[name], err_msg=name)
     told = json.dumps(results)
-    assert not re.search("nonexistent|wrong", told)
+    assert not re.search("nonexistent|the wrong (program|scene)", told)
 
 
 def test_exported_lines_work_in_a_hostile_world(tmp_path: Path, peaceful: dict[str, Any]) -> None:
@@ -357,12 +358,9 @@ def test_exports_hold_nothing_of_a_scene_but_numbers(
     except (Unsupported, InputError):
         return
     simple = adapter(name).export(Scene((1, 2, 3), 0.5), Settings(64, 48, 3))
-    assert exported.files.keys() == simple.files.keys()
-    assert (exported.command, exported.image, exported.environment) == (
-        simple.command,
-        simple.image,
-        simple.environment,
-    )
+    assert all(re.fullmatch(r"[a-z0-9][a-z0-9_.-]*", file) for file in [*exported.files, exported.image])
+    assert exported.environment == simple.environment
+    assert [NUMBER.sub("#", word) for word in exported.command] == [NUMBER.sub("#", word) for word in simple.command]
     text = dump(scene)
     assert re.fullmatch(r"[0-9eE+\-. \n]*", text)
     assert "--" not in text
