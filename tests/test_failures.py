@@ -74,7 +74,7 @@ def test_every_failure_is_told_and_the_rest_is_done(tmp_path: Path) -> None:
     povray.chmod(0o755)
     path = os.pathsep.join([str(povray.parent), os.environ["PATH"]])
     environment = offer(tmp_path / "fakes", scripts) | {"TMPDIR": str(tmp_path / "tmp"), "PATH": path}
-    found = check(["povray", "native", *scripts], tmp_path / "out", environment, timeout=8)
+    found = check(["povray", "native", *scripts], tmp_path / "out", environment, timeout=6)
     assert_is_right(found.pop("native"), tmp_path / "out")
     crashed = found.pop("povray")
     assert (crashed["version"], crashed["status"]) == ("unknown", "failed")
@@ -84,7 +84,7 @@ def test_every_failure_is_told_and_the_rest_is_done(tmp_path: Path) -> None:
     assert {comparison["command"] for comparison in found.values()} == {"sh draw.sh"}
     reasons = {name: comparison["reason"] for name, comparison in found.items()}
     logs = {name: comparison["log"] for name, comparison in found.items()}
-    assert reasons["hangs"] == "it ran out of time (8 s): begun"
+    assert reasons["hangs"] == "it ran out of time (6 s): begun"
     assert reasons["segfaults"] == "it was stopped by SIGSEGV: allocating"
     assert reasons["aborts"] == "it was stopped by SIGABRT: assertion failed"
     assert reasons["truncates"].startswith("it left no usable picture (a whole picture, found one that breaks off)")

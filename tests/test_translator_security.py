@@ -290,6 +290,14 @@ def test_complaints_do_not_command_the_terminal(tmp_path: Path) -> None:
         assert result.stderr.rstrip("\n").isprintable()
 
 
+def test_pictures_cannot_be_called_what_their_library_cannot_open(tmp_path: Path) -> None:
+    for words in (["render", str(EXAMPLE), "-o", "caf\udce9.png"], ["render", str(EXAMPLE), "-o", "caf\udce9/a.png"]):
+        result = run([*CROSSRAY, *words, "--size", "8x8"], dict(os.environ), tmp_path)
+        assert result.returncode == 2, result
+        assert "expected a path in UTF-8 for a picture" in result.stderr
+        assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("mask", [0o000, 0o022, 0o077])
 def test_the_private_folder_is_private(mask: int, tmp_path: Path) -> None:
     """Whatever the umask, others can neither enter it nor put anything there."""
