@@ -9,7 +9,7 @@ import re
 import signal
 import sys
 import warnings
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice, pairwise
@@ -33,6 +33,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SHOWN_WARNINGS = 20
 TIMED_RUNS = 5
 SHORTEST_PROOF = 600.0  # seconds that proving a picture may take, whatever renderers may
+EMPTY = Scene((255.0, 255.0, 255.0), 0.1)
 
 app = typer.Typer(
     add_completion=False,
@@ -396,8 +397,9 @@ def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
     """
     from reference.device import describe
     from reference.errors import RendererError
-    from translator.registry import NATIVE, adapter, renderer_names
-    from translator.run import installed_version
+    from translator.contract import Settings, Unsupported
+    from translator.registry import NATIVE, adapter, ignored_offers, renderer_names
+    from translator.run import export_scene, installed_version
 
     parts = describe()
     healthy = all(fine for _, fine, _ in parts)
@@ -406,6 +408,8 @@ def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
     for name in renderer_names():
         try:
             renderer, version = adapter(name), installed_version(name)
+            with suppress(Unsupported):
+                export_scene(name, EMPTY, Settings())
         except RendererError as error:
             _print(f"BROKEN  {name}: {error}")
             continue
@@ -415,6 +419,8 @@ def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
             _print(f"works   {name}: {renderer.TITLE} {version}")
         else:
             _print(f"missing {name}: {renderer.INSTALL}")
+    for offer in ignored_offers():
+        _print(f"ignored {offer}")
     raise typer.Exit(DONE if healthy else NOT_DONE)
 
 

@@ -10,14 +10,24 @@ A renderer is one module in `translator/renderers`; its name there (`_` read as 
     export   (scene, settings) -> Export: pure, the same files for the same scene, with nothing installed.
              Raises Unsupported for what the renderer cannot carry, before anything runs.
     SUMMARY  (may be missing) pattern: what in the log of a run belongs in the report
+
+A renderer of somebody else is such a module in a distribution of its own, which offers it as an entry point:
+
+    [project.entry-points."crossray.renderers"]
+    my-tracer = "my_tracer_adapter"
+
+`tests/example_renderer` is one, to copy: `pip install` it beside crossray, and every command knows `my-tracer`. Its
+adapter may use `reference.scene`, `reference.text` and this module. What it does wrong costs its own pictures only.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import astuple, dataclass, field
+from pathlib import PurePosixPath
+from typing import Protocol, cast
 
 from reference.errors import CrossrayError
 from reference.scene import Scene
@@ -43,12 +53,16 @@ class Limits:
 
     `precision`: the relative error that its points and directions may have. `gap`: how far from its start a shadow or
     mirrored ray may miss things, where the renderer starts its rays a little ahead. `far`: the distance from which on
-    rays may miss things, 0 for none.
+    rays may miss things, 0 for none. Raises ValueError for what is not a finite number from 0 on.
     """
 
     precision: float = 0.0
     gap: float = 0.0
     far: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(0 <= value < math.inf for value in astuple(self)):
+            raise ValueError(f"expected finite limits from 0 on, found {self}")
 
 
 @dataclass(frozen=True)
@@ -56,8 +70,8 @@ class Export:
     """A scene in a renderer's own language.
 
     `command` is run in a folder that holds `files` and leaves the picture `image` there: linear, levels / 255.
-    `environment` is set for it, in the line that people type too.
-    `notes` tell a reader what is not obvious about the files.
+    `environment` is set for it, in the line that people type too. `notes` tell a reader what is not obvious about the
+    files. Raises ValueError for a name that leads out of the folder, and TypeError for what is no text.
     """
 
     files: Mapping[str, str]
@@ -66,6 +80,20 @@ class Export:
     notes: tuple[str, ...] = ()
     environment: Mapping[str, str] = field(default_factory=dict)
     limits: Limits = Limits()
+
+    def __post_init__(self) -> None:
+        texts = [*self.files, *self.files.values(), *_words(self.command), self.image, *_words(self.notes)]
+        texts += [*self.environment, *self.environment.values()]
+        if wrong := [text for text in texts if not isinstance(text, str)]:
+            raise TypeError(f"expected text in an export, found {wrong[0]!r}")
+        if not self.command:
+            raise ValueError("expected a command, found none")
+        if not isinstance(self.limits, Limits):
+            raise TypeError(f"expected Limits, found {self.limits!r}")
+        for name in (*self.files, self.image):
+            place = PurePosixPath(name)
+            if place.is_absolute() or not place.parts or ".." in place.parts or "\0" in name:
+                raise ValueError(f"expected a name inside the folder of the export, found {name!r}")
 
 
 class Unsupported(CrossrayError):
@@ -103,3 +131,28 @@ class Adapter(Protocol):
     @staticmethod
     def export(scene: Scene, settings: Settings) -> Export:
         """The scene in the renderer's language."""
+
+
+def check_adapter(module: object) -> Adapter:
+    """The same module, once it has what an adapter needs. Raises TypeError for what is missing or of another kind."""
+    for name in ("TITLE", "LICENCE", "INSTALL", "TIMING"):
+        if not isinstance(getattr(module, name, None), str):
+            raise TypeError(f"it has no text {name}")
+    match getattr(module, "VERSION", None):
+        case (tuple(command), str(pattern)) if command and all(isinstance(word, str) for word in command):
+            patterns = {"VERSION": pattern, "TIMING": cast(Adapter, module).TIMING}
+        case _:
+            raise TypeError("its VERSION is not a command and a pattern")
+    for name, pattern in patterns.items():
+        if not re.compile(pattern).groups:
+            raise TypeError(f"its pattern {name} has no group")
+    re.compile(getattr(module, "SUMMARY", ""))
+    if not callable(getattr(module, "export", None)):
+        raise TypeError("it has no function export")
+    return cast(Adapter, module)
+
+
+def _words(value: tuple[str, ...]) -> tuple[str, ...]:
+    if not isinstance(value, tuple):
+        raise TypeError(f"expected a tuple of texts, found {value!r}")
+    return value

@@ -54,8 +54,9 @@ def run_process(command: list[str], folder: Path, extra: dict[str, str], timeout
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-    except OSError as error:
-        raise RendererError(f"{program} does not start: {error.strerror}") from error
+    except (OSError, ValueError) as error:  # ValueError: a word that no program can be given
+        fault = error.strerror if isinstance(error, OSError) else error
+        raise RendererError(f"{program} does not start: {fault}") from error
     _running.add(process)
     reason = None
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 import sys
@@ -79,17 +80,25 @@ def run_renderer(name: str, scene: Scene, settings: Settings, timeout: float = 6
         log = error.log if isinstance(error, RendererError) else ""
         return replace(outcome, reason=_reason(str(error), log), seconds=time.perf_counter() - start, log=log)
     seconds = time.perf_counter() - start
-    timing = re.search(renderer.TIMING, log)
     summary = re.search(getattr(renderer, "SUMMARY", r"(?!)"), log)
     return replace(
         outcome,
         status=RENDERED,
         seconds=seconds,
-        trace_seconds=float(timing[1]) if timing else None,
+        trace_seconds=_number(re.search(renderer.TIMING, log)),
         picture=picture,
         log=log,
         summary=summary[0] if summary else None,
     )
+
+
+def _number(match: re.Match[str] | None) -> float | None:
+    """What a pattern found, if it is a finite number."""
+    try:
+        value = float(match[1] or "") if match else math.nan
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
 
 
 def _reason(message: str, log: str) -> str:
@@ -102,12 +111,15 @@ def export_scene(name: str, scene: Scene, settings: Settings) -> Export:
     """The scene in that renderer's language. Raises Unsupported, and RendererError for an adapter that is at fault."""
     renderer = adapter(name)
     try:
-        return renderer.export(scene, settings)
+        export = renderer.export(scene, settings)
+        if not isinstance(export, Export):
+            raise TypeError(f"expected an Export, found {export!r}")
     except Unsupported:
         raise
-    except Exception as error:  # adapters can be anybody's
+    except (Exception, SystemExit) as error:  # adapters can be anybody's
         reason = f"its adapter failed: {type(error).__name__}: {error}"
         raise RendererError(reason, traceback.format_exc()) from error
+    return export
 
 
 def draw(export: Export, settings: Settings, timeout: float) -> tuple[NDArray[np.floating[Any]], str]:
@@ -149,7 +161,7 @@ def installed_version(name: str) -> str | None:
         except RendererError:
             return "unknown" if command[0] != PYTHON and find_program(command[0]) else None
     match = re.search(pattern, answer)
-    return match[1] if match else "unknown"
+    return (match[1] if match else None) or "unknown"
 
 
 def _resolve(command: tuple[str, ...]) -> list[str]:
