@@ -35,8 +35,9 @@ soundness: $(READY)  ## Prove certified pixels a second time, every one, with Ar
 pictures: report browser  ## Draw the pictures of the README
 	$(BIN)/python docs/pictures.py
 
-docs: $(READY)  ## Write the generated pages of docs/
+docs: $(READY) renderers  ## Write the generated pages of docs/ (minutes)
 	$(BIN)/python docs/scenes.py
+	$(BIN)/python docs/renderers.py
 
 lock: $(READY)  ## Pin the newest versions of all dependencies, with hashes
 	$(BIN)/pip-compile --quiet --upgrade --generate-hashes --allow-unsafe --strip-extras --extra dev --no-header \
