@@ -28,20 +28,23 @@ class Size(NamedTuple):
 def installed_size(line: str, more: Iterable[str] = ()) -> Size | None:
     """Of the package that a line like `pip install x` or `apt-get install x` installs; None where it is not there.
 
-    `more` are packages that it needs without saying so. A Debian package is counted without what every Debian has.
+    Of `pip install 'x[y]'` it is what the extra y adds to x. `more` are packages that are needed without being named.
+    A Debian package is counted without what every Debian has.
     """
-    match = re.match(r"(pip|apt-get) install ([\w.+-]+)", line)
+    match = re.match(r"(pip|apt-get) install '?([\w.+-]+)(?:\[([\w-]+)\])?", line)
     if not match:
         return None
+    named = {match[2]}
+    if match[3]:
+        named = {*(_python_needs(match[2], match[3]) or ())} - {*(_python_needs(match[2]) or ())}
     packages, sizes, base = (
         (_python_closure, _python_size, set[str]())
         if match[1] == "pip"
         else (_debian_closure, _debian_size, _debian_closure(_essential()))
     )
-    if match[2] not in packages([match[2]]):
+    if not named or not named <= packages(named):
         return None
-    whole = packages([match[2], *more]) - base
-    return Size(sizes(match[2]), sum(map(sizes, whole)))
+    return Size(sum(map(sizes, named)), sum(map(sizes, packages([*named, *more]) - base)))
 
 
 def _closure(first: Iterable[str], needs: Callable[[str], Iterable[str] | None]) -> set[str]:
@@ -60,13 +63,12 @@ def _python_closure(first: Iterable[str]) -> set[str]:
     return _closure(first, _python_needs)
 
 
-def _python_needs(name: str) -> list[str] | None:
+def _python_needs(name: str, extra: str = "") -> list[str] | None:
     try:
         wanted = map(Requirement, metadata.requires(name) or [])
     except metadata.PackageNotFoundError:
         return None
-    environment = {"extra": ""}
-    return [each.name.lower() for each in wanted if not each.marker or each.marker.evaluate(environment)]
+    return [each.name.lower() for each in wanted if not each.marker or each.marker.evaluate({"extra": extra})]
 
 
 def _python_size(name: str) -> int:

@@ -78,5 +78,11 @@ def test_sizes_are_those_on_disk() -> None:
     assert on_disk < numpy.alone < 3 * on_disk
     assert numpy.whole == numpy.alone
     assert installed_size("pip install numpy", ["jinja2"]).whole > numpy.alone
-    for line in ("pip install no-such-thing", "apt-get install no-such-thing", "see their site"):
+    assert installed_size("pip install 'crossray[dev]' (for Python 3.11)").alone > 1e6
+    for line in (
+        "pip install 'crossray[no-such-extra]'",
+        "pip install no-such-thing",
+        "apt-get install no-such-thing",
+        "see their site",
+    ):
         assert installed_size(line) is None
