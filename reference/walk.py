@@ -13,6 +13,7 @@ from reference.rules import Rules
 Verdict = bool | None  # None: the balls cannot tell
 
 ZERO, ONE = arb(0), arb(1)
+NOWHERE = -1  # in place of the surface that a ray leaves, where it starts off it
 
 
 class UndecidedError(Exception):
@@ -101,7 +102,8 @@ class Walk:
                 self.leave_behind(hit, origin, d)
                 break
             weight = weight * surface.reflection
-            origin, d, leaving = point, self.loosened(mirrored(d, arm, surface)), hit.place
+            d = self.loosened(mirrored(d, arm, surface))
+            origin, leaving = self.start(point, arm, d, hit.place)
         return total
 
     def loosened(self, point: Point) -> Point:
@@ -150,7 +152,19 @@ class Walk:
             return ZERO
         if not cosine > 0:
             return ZERO.union(cosine.upper())  # whether or not something blocks it
-        return ZERO if self.blocked(point, to_light, distance, index) else cosine
+        start, left = self.start(point, arm, to_light, index)
+        if left != index:
+            to_light = minus(self.tables.light, start)
+            distance = dot(to_light, to_light).sqrt()
+        return ZERO if self.blocked(start, to_light, distance, left) else cosine
+
+    def start(self, point: Point, arm: Point, d: Point, place: int) -> tuple[Point, int]:
+        """Where the ray along `d` starts that leaves a surface of normal `arm`, and the surface that it is on there."""
+        if not self.rules.ahead:
+            return point, place
+        largest = max(float(abs(a - ball(b)).mid()) for a, b in zip(point, self.rules.origin, strict=True))
+        step = arb(self.rules.ahead * (1 + largest)) / dot(arm, arm).sqrt()
+        return along(point, -step if dot(arm, d) < 0 else step, arm), NOWHERE
 
     def blocked(self, point: Point, to_light: Point, distance: arb, leaving: int) -> bool:
         """Whether a surface stands before the light; by choice where that is open."""

@@ -8,6 +8,7 @@ is the one in question, that renderer may find this colour.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from flint import arb
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from reference.enclosure import Point, Tables
 from reference.proof import Prover
-from reference.rules import EXACT_RULES
+from reference.rules import Rules
 from reference.scene import Triple
 from reference.walk import UnboundedError, UndecidedError, Walk
 
@@ -32,8 +33,8 @@ MET = 0.01  # levels
 class _Path(Walk):
     """A walk whose points and directions are off by what is given, as shares of their largest coordinate."""
 
-    def __init__(self, tables: Tables, errors: Array) -> None:
-        super().__init__(tables, EXACT_RULES, [], may_choose=False)
+    def __init__(self, tables: Tables, rules: Rules, errors: Array) -> None:
+        super().__init__(tables, rules, [], may_choose=False)
         self.errors = iter(errors)
 
     def loosened(self, point: Point) -> Point:
@@ -45,14 +46,14 @@ class _Path(Walk):
 class _Search:
     """Newton's method for the errors that make a pixel's colour, clamped, the one in question."""
 
-    def __init__(self, prover: Prover, tables: Tables, pixel: tuple[int, int], precision: float, goal: Array) -> None:
+    def __init__(self, prover: Prover, tables: Tables, pixel: tuple[int, int], rules: Rules, goal: Array) -> None:
         self.depth, self.direction, self.tables = prover.depth, prover.direction(*pixel), tables
-        self.precision, self.goal = precision, goal
+        self.precision, self.rules, self.goal = rules.precision, replace(rules, precision=0.0), goal
 
     def miss(self, errors: Array) -> Array:
         """What the path's colour lacks: levels; infinite for a path that is no path."""
         try:
-            colour = _Path(self.tables, errors * self.precision).colour(self.direction, self.depth)
+            colour = _Path(self.tables, self.rules, errors * self.precision).colour(self.direction, self.depth)
         except (UndecidedError, UnboundedError):
             return np.full(3, math.inf)
         return np.asarray(self.goal - np.clip([float(channel.mid()) for channel in colour], 0, 255))
@@ -73,17 +74,17 @@ class _Search:
         return None
 
 
-def find_error(prover: Prover, column: int, row: int, colour: Triple, precision: float) -> float | None:
-    """A relative error, at most `precision`, that a path has on which the pixel is of that colour; None if none is met.
+def find_error(prover: Prover, column: int, row: int, colour: Triple, rules: Rules) -> float | None:
+    """How large errors suffice, relative and within the precision of `rules`, for a path that brings back `colour`.
 
-    The colour is met within a hundredth of a level. The search is the same each time.
+    None if none is found. The colour is met within a hundredth of a level. The search is the same each time.
     """
     pick = np.random.default_rng(0)
     with prover.tables(BITS) as tables:
-        search = _Search(prover, tables, (column, row), precision, np.clip(colour, 0, 255))
+        search = _Search(prover, tables, (column, row), rules, np.clip(colour, 0, 255))
         for size in SIZES:
             starts = size * pick.uniform(-1, 1, (TRIES if size else 1, 2 * prover.depth + 2, 3))
             errors = search.follow(min(starts, key=lambda start: float(np.abs(search.miss(start)).max())))
             if errors is not None:
-                return precision * float(np.abs(errors).max())
+                return rules.precision * float(np.abs(errors).max())
     return None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from reference.proof import Admissible, Colour, Prover
 from reference.rules import DOCUMENT_RULES, Rules
-from reference.scene import Triple
+from reference.scene import EYE, Triple
 from reference.witness import find_error
 from reports.metrics import TOLERANCE
 
@@ -22,7 +22,8 @@ CLASSES = {
     KNIFE_EDGE: "No precision can decide the pixel, and this is one of the colours that it may have.",
     DOCUMENT_WINDOW: "The colour by the document's text, whose smallest distance is 1e-4 where the truth has none.",
     PRECISION: "The other side of a branch, or a path between mirrors, within the error of the renderer's arithmetic.",
-    LIMIT: "The colour without what is closer to the start of a ray, or farther, than the renderer can see.",
+    LIMIT: "The colour by rays that start where the renderer starts them, or without what is closer to their start, or"
+    " farther, than it can see.",
 }
 STEPS = (2.0**-8, 2.0**-4, 1.0)  # of the declared precision: the smallest that explains a pixel is named
 CLOSE = 0.1  # levels: how near a renderer must come to the colour of another branch
@@ -38,12 +39,13 @@ class Reason(NamedTuple):
 
 
 def account(
-    prover: Prover, limits: Mapping[str, float], picture: NDArray[Any], places: NDArray[np.intp]
+    prover: Prover, limits: Mapping[str, Any], picture: NDArray[Any], places: NDArray[np.intp]
 ) -> list[Reason | None]:
     """A reason for each of `places` (row, column) of a picture in levels, None for those that are unexplained.
 
     `limits` are what the renderer declared: `precision`, the relative error of its points and directions; `gap` and
-    `far`, the distances from the start of a ray up to which and from which on it may miss things. After very many
+    `far`, the distances from the start of a ray up to which and from which on it may miss things; `ahead` and `origin`,
+    where its rays start. After very many
     unexplained pixels the rest counts as unexplained too.
     """
     most = max(50, GIVE_UP // max(1, prover.surfaces))
@@ -57,7 +59,7 @@ def account(
     return reasons
 
 
-def explain_pixel(prover: Prover, limits: Mapping[str, float], column: int, row: int, value: Triple) -> Reason | None:
+def explain_pixel(prover: Prover, limits: Mapping[str, Any], column: int, row: int, value: Triple) -> Reason | None:
     """Which class holds `value`, the colour that a renderer gave a pixel; None for no class."""
     if not all(map(math.isfinite, value)):
         return None
@@ -67,8 +69,11 @@ def explain_pixel(prover: Prover, limits: Mapping[str, float], column: int, row:
         return Reason(KNIFE_EDGE, f"one of {number} admissible colours")
     if _explains(prover.admissible(column, row, DOCUMENT_RULES), truth, value, TOLERANCE):
         return Reason(DOCUMENT_WINDOW, "the colour by the document's text")
-    precision, gap, far = (limits.get(name, 0.0) for name in ("precision", "gap", "far"))
-    for kind, sight in ((PRECISION, Rules()), (LIMIT, Rules(gap=gap, far=far))):
+    precision, gap, far, ahead = (limits.get(name, 0.0) for name in ("precision", "gap", "far", "ahead"))
+    start = Rules(ahead=ahead, origin=tuple(limits.get("origin", EYE)))
+    if ahead and any(_is_evidence(colour, value) for colour in prover.admissible(column, row, start).colours):
+        return Reason(LIMIT, f"the colour by rays that start off their surface, by {ahead:g} of the coordinates")
+    for kind, sight in ((PRECISION, start), (LIMIT, replace(start, gap=gap, far=far))):
         widest = replace(sight, precision=precision)
         if not widest.has_leeway or (kind == LIMIT and not sight.has_leeway):
             continue
@@ -80,7 +85,7 @@ def explain_pixel(prover: Prover, limits: Mapping[str, float], column: int, row:
             if not found.proven and _explains(prover.admissible(column, row, rules), truth, value, CLOSE):
                 return Reason(kind, f"the other side of a branch, reached by {_evidence(rules)}")
         agrees = any(_holds(colour, value) for colour in truth.colours)
-        if kind == PRECISION and not agrees and (error := find_error(prover, column, row, value, precision)):
+        if kind == PRECISION and not agrees and (error := find_error(prover, column, row, value, widest)):
             return Reason(kind, f"a path with errors of up to 2^{math.log2(error):.1f} of the coordinates")
     return None
 
@@ -88,11 +93,14 @@ def explain_pixel(prover: Prover, limits: Mapping[str, float], column: int, row:
 def _explains(other: Admissible, truth: Admissible, value: Triple, tolerance: float) -> bool:
     """Whether the value is a sharp colour of a branch that does not agree with the truth."""
     return any(
-        max(colour.radius) <= WEAK
-        and _holds(colour, value, tolerance)
-        and not any(_holds(colour, right.value) for right in truth.colours)
+        _is_evidence(colour, value, tolerance) and not any(_holds(colour, right.value) for right in truth.colours)
         for colour in other.colours
     )
+
+
+def _is_evidence(colour: Colour, value: Triple, tolerance: float = CLOSE) -> bool:
+    """Whether a colour is sharp and the value's."""
+    return max(colour.radius) <= WEAK and _holds(colour, value, tolerance)
 
 
 def _holds(colour: Colour, value: Triple, tolerance: float = TOLERANCE) -> bool:

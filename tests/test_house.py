@@ -102,8 +102,8 @@ def test_the_wheel_holds_what_it_should(wheel: Path) -> None:
     top = {name.partition("/")[0] for name in names}
     assert {name for name in top if not name.endswith(".dist-info")} == {"crossray.py", *PACKAGES}
     assert {"reports/assets/report.html", "reference/scenes/example1.txt"} <= set(names)
-    companions = ("cycles/studio.py", "mitsuba/whitted.py", "radiance/render.py", "tachyon/draw.py")
-    assert {f"translator/renderers/{name}" for name in companions} <= set(names)
+    companions = ("cycles/studio", "mitsuba/whitted", "mitsuba_stock/draw", "radiance/render", "tachyon/draw")
+    assert {f"translator/renderers/{name}.py" for name in companions} <= set(names)
     assert not [name for name in names if name.endswith((".pyc", ".exr"))]
 
 

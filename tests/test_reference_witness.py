@@ -19,7 +19,7 @@ RED, GREEN = Sphere((250, 30, 20), (-10.5, 0, 300), 10, 0.5, 1), Sphere((20, 220
 BLUE = Sphere((30, 60, 240), (0, 0, 318.5), 10, 0.5, 1)
 SCENE = Scene((255, 255, 255), 0.2, (RED, GREEN, BLUE), (FLOOR,))
 PIXEL, DEPTH = (492, 530), 5
-SINGLE = 2.0**-20
+SINGLE = Rules(precision=2.0**-20)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def colour_of(prover: Prover, size: float) -> Triple:
     """What a path brings back whose errors are up to that."""
     errors = np.random.default_rng(7).uniform(-1, 1, (2 * DEPTH + 2, 3))
     with prover.tables(128) as tables:
-        red, green, blue = -_Search(prover, tables, PIXEL, size, np.zeros(3)).miss(errors)
+        red, green, blue = -_Search(prover, tables, PIXEL, Rules(precision=size), np.zeros(3)).miss(errors)
     return (red, green, blue)
 
 
@@ -46,7 +46,7 @@ def test_a_path_without_errors_is_the_proven_one(prover: Prover) -> None:
 
 
 def test_balls_hold_nothing_there(prover: Prover) -> None:
-    assert not prover.admissible(*PIXEL, Rules(precision=SINGLE)).complete
+    assert not prover.admissible(*PIXEL, SINGLE).complete
 
 
 @pytest.mark.parametrize("size", [2.0**-21, 2.0**-22, 2.0**-24])
@@ -56,13 +56,13 @@ def test_a_colour_that_errors_make_is_found_with_no_larger_ones(prover: Prover, 
     assert found
     assert found <= size
     assert found == find_error(prover, *PIXEL, colour, SINGLE)
-    assert find_error(prover, *PIXEL, colour, found / 8) is None
+    assert find_error(prover, *PIXEL, colour, Rules(precision=found / 8)) is None
 
 
 def test_the_pixel_is_explained_by_that_precision_only(prover: Prover) -> None:
     value = colour_of(prover, 2.0**-21)
     assert max(abs(a - b) for a, b in zip(value, truth(prover), strict=True)) > 0.5
-    reason = explain_pixel(prover, asdict(Limits(SINGLE)), *PIXEL, value)
+    reason = explain_pixel(prover, asdict(Limits(SINGLE.precision)), *PIXEL, value)
     assert reason
     assert reason.kind == PRECISION
     assert reason.evidence.startswith("a path with errors of up to 2^-2")
@@ -73,14 +73,14 @@ def test_the_pixel_is_explained_by_that_precision_only(prover: Prover) -> None:
 @pytest.mark.parametrize("wrong", [(0.6, -0.6, 0.6), (-2, 2, 2), (0, 30, 0), (-30, -30, 30)])
 def test_a_colour_that_no_small_errors_make_is_unexplained(prover: Prover, wrong: Triple) -> None:
     red, green, blue = (a + b for a, b in zip(truth(prover), wrong, strict=True))
-    assert explain_pixel(prover, asdict(Limits(SINGLE)), *PIXEL, (red, green, blue)) is None
+    assert explain_pixel(prover, asdict(Limits(SINGLE.precision)), *PIXEL, (red, green, blue)) is None
 
 
 def test_what_agrees_and_what_balls_exclude_is_not_searched(monkeypatch: pytest.MonkeyPatch, prover: Prover) -> None:
     monkeypatch.setattr(reports.accounting, "find_error", lambda *_: pytest.fail("searched"))
     red, green, blue = truth(prover)
-    assert explain_pixel(prover, asdict(Limits(SINGLE)), *PIXEL, (red + 0.4, green, blue)) is None
+    assert explain_pixel(prover, asdict(Limits(SINGLE.precision)), *PIXEL, (red + 0.4, green, blue)) is None
     floor = (300, 900)
     (seen,) = prover.admissible(*floor).colours
     red, green, blue = seen.value
-    assert explain_pixel(prover, asdict(Limits(SINGLE)), *floor, (red + 0.6, green, blue)) is None
+    assert explain_pixel(prover, asdict(Limits(SINGLE.precision)), *floor, (red + 0.6, green, blue)) is None

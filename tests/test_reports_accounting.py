@@ -76,6 +76,16 @@ def colours(scene: Scene, pixel: tuple[int, int]) -> list[Triple]:
     return [colour.value for colour in found.colours]
 
 
+def test_rays_that_start_off_their_surface_pass_what_stands_there() -> None:
+    """Up by 1e-3 of 401 the shadow ray's start is still before the wall, which slants; by 1.5e-3 it is beyond."""
+    scene = scene_of(FLOOR, replace(WALL, point=(20.055, -100, 400), normal=(1, 0.1, 0)))
+    reason = why(scene, LIT, Limits(ahead=1.5e-3))
+    assert reason == Reason(LIMIT, "the colour by rays that start off their surface, by 0.0015 of the coordinates")
+    assert why(scene, np.add(LIT, 1), Limits(ahead=1.5e-3)) is None
+    assert why(scene, LIT, Limits(ahead=1e-3)) is None
+    assert why(scene, LIT, Limits(ahead=1.5e-3, origin=POINT)) is None
+
+
 CORNER = Scene.load(ROOT / "scenes" / "diagnostic" / "corner_tie.txt")
 TIES = [(0, 9), (1, 8)]  # on the diagonal, where side wall and floor meet: each of them lit, or in the other's shadow
 

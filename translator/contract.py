@@ -25,12 +25,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Protocol, cast
 
 from reference.errors import CrossrayError
-from reference.scene import Scene
+from reference.scene import EYE, Scene, Triple
 from reference.text import dump
 
 SMALLEST, LARGEST = 1e-25, 1e25  # of colours and coefficients in single precision, so that products stay in range
@@ -53,15 +53,20 @@ class Limits:
 
     `precision`: the relative error that its points and directions may have. `gap`: how far from its start a shadow or
     mirrored ray may miss things, where the renderer starts its rays a little ahead. `far`: the distance from which on
-    rays may miss things, 0 for none. Raises ValueError for what is not a finite number from 0 on.
+    rays may miss things, 0 for none. `ahead`: shadow and mirrored rays start off their surface, along its normal, by
+    this times 1 + the largest coordinate of the point as seen from `origin`. Raises ValueError for what is no finite
+    number, or below 0.
     """
 
     precision: float = 0.0
     gap: float = 0.0
     far: float = 0.0
+    ahead: float = 0.0
+    origin: Triple = EYE
 
     def __post_init__(self) -> None:
-        if not all(0 <= value < math.inf for value in astuple(self)):
+        sizes = (self.precision, self.gap, self.far, self.ahead)
+        if not (all(0 <= value < math.inf for value in sizes) and all(map(math.isfinite, self.origin))):
             raise ValueError(f"expected finite limits from 0 on, found {self}")
 
 
