@@ -23,8 +23,8 @@ from reference.walk import UnboundedError, UndecidedError, Walk
 Array = NDArray[np.float64]  # errors: for each point and direction in turn, as shares of the precision; or levels
 
 BITS = 128
-SIZES = (0.0, 2.0**-8, 2.0**-4, 1.0)  # of the errors with which a search starts
-TRIES = 16  # starts of each size; the one that comes nearest is followed
+SIZES = (0.0, *(2.0**-power for power in (8, 6, 4, 2, 0)))  # of the errors with which a search starts
+TRIES = 64  # starts of each size; the one that comes nearest is followed
 PROBE = 2.0**-10  # how far errors are varied to see what they do
 STEPS = 6  # of Newton's method
 MET = 0.01  # levels

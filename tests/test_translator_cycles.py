@@ -167,9 +167,9 @@ REFUSED = {
     "sphere across the screen": (scene_of(ball(10, 0, 100, 5)), SETTINGS, INSIDE.format("sphere 1")),
     "sphere at the screen's corner": (scene_of(ball(60, 60, 100, 15.5)), SETTINGS, INSIDE.format("sphere 1")),
     "many mirrors": (
-        scene_of(*(ball(9 * place, 0, 300, 4, 0.5) for place in range(21))),
-        SETTINGS,
-        "Cycles' single precision is too coarse for 3 bounces between 21 mirroring spheres (at most 20)",
+        scene_of(*(ball(9 * place, 0, 300, 4, 0.5) for place in range(20))),
+        Settings(64, 48, 4),
+        "Cycles' single precision is too coarse for 4 bounces between 20 mirroring spheres (at most 3)",
     ),
     "mirrors that meet on a line through the eye": (
         scene_of(
@@ -223,10 +223,8 @@ REFUSED = {
 CARRIED = {
     "deepest": (scene_of(MIRROR), Settings(64, 64, 50)),
     "smallest": (scene_of(BALL), Settings(4, 800)),
-    "many mirrors that show no other": (
-        scene_of(*[replace(MIRROR, radius=place + 9) for place in range(30)]),
-        Settings(64, 64, 1),
-    ),
+    "many mirrors": (scene_of(*[replace(MIRROR, radius=place + 9) for place in range(30)]), SETTINGS),
+    "deep mirrors": (scene_of(*[replace(MIRROR, radius=place + 9) for place in range(19)]), Settings(64, 64, 50)),
     "sphere before the screen": (scene_of(ball(10, 0, 94, 5)), SETTINGS),
     "eye in a small sphere": (scene_of(ball(0, 0, 0, 99)), SETTINGS),
     "sphere between pixels": (scene_of(ball(0, 0, 100, 0.5)), SETTINGS),

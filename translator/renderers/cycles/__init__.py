@@ -34,7 +34,8 @@ COARSE = "Cycles' single precision is too coarse"
 FARTHEST = 1e6  # of a sphere
 FARTHEST_PLANE = 1e8
 LARGEST_RADIUS = 5000
-MOST_BALLS = 20  # that mirror each other: each magnifies the error, and more ways lead between more of them
+MANY_BALLS = 20  # that mirror each other: each magnifies the error, and more ways lead between more of them
+DEEPEST_BETWEEN_BALLS = 3  # bounces, where there are so many
 APART = 1e-3  # between surfaces that look alike
 
 # What Blender and Cycles allow.
@@ -155,8 +156,9 @@ def _refuse_sphere(name: str, sphere: Sphere, settings: Settings) -> None:
 
 def _refuse_mirrors(spheres: dict[str, Sphere], planes: dict[str, Plane], bounces: int) -> None:
     balls = sum(sphere.reflection != 0 for sphere in spheres.values())
-    if bounces > 1 and balls > MOST_BALLS:
-        raise Unsupported(f"{COARSE} for {bounces} bounces between {balls} mirroring spheres (at most {MOST_BALLS})")
+    if bounces > DEEPEST_BETWEEN_BALLS and balls >= MANY_BALLS:
+        most = f"(at most {DEEPEST_BETWEEN_BALLS})"
+        raise Unsupported(f"{COARSE} for {bounces} bounces between {balls} mirroring spheres {most}")
     through_eye = [name for name, plane in planes.items() if not plane.distance_from(EYE)]
     if len(through_eye) > 1 and any(planes[name].reflection for name in through_eye):
         edge = " and ".join(through_eye[:2])
