@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import astuple
 from importlib.metadata import version
 from itertools import chain, islice
 from pathlib import Path
@@ -98,9 +97,11 @@ def limits() -> list[list[str]]:
     rows = []
     for name in names():
         exports = (exported(name, scene) for scene in (*EXAMPLES, *DIAGNOSTIC))
-        declared = [astuple(export.limits) for export in exports if isinstance(export, Export)] or [astuple(Limits())]
-        precision, gap, far = zip(*declared, strict=True)
-        rows.append([_title(name), _range(precision, _power), _range(gap, "{:g}".format), _range(far, _distance)])
+        declared = [export.limits for export in exports if isinstance(export, Export)] or [Limits()]
+        plain = "{:.3g}".format
+        written = {"precision": _power, "ahead": plain, "gap": plain, "far": _distance}
+        ranges = (_range([getattr(one, field) for one in declared], text) for field, text in written.items())
+        rows.append([_title(name), *ranges])
     return rows
 
 
@@ -193,7 +194,7 @@ def page() -> str:
 
 
 RENDERERS = ("renderer", "name", "to install it", "licence", "version", "size", "with all that it needs")
-LIMITS = ("renderer", "relative precision", "sees from", "to")
+LIMITS = ("renderer", "relative precision", "starts ahead by", "sees from", "to")
 PARTS = """\
 # The renderers
 
@@ -205,8 +206,9 @@ package libraries that not every Debian has.
 
 ## What their arithmetic cannot do better
 
-Each adapter declares for each scene the relative error that points and directions may have, and the distances from and
-to which a ray may miss things. Where that explains a pixel, it is explained; see [docs/truth.md](truth.md).
+Each adapter declares for each scene the relative error that points and directions may have, how far off a surface rays
+start that leave it, as a share of the coordinates, and the distances up to which and from which on a ray may miss
+things, in the assignment's units. Where that explains a pixel, it is explained; see [docs/truth.md](truth.md).
 
 {limits}
 ## How they agree on the document's examples
