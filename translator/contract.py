@@ -17,7 +17,8 @@ A renderer of somebody else is such a module in a distribution of its own, which
     my-tracer = "my_tracer_adapter"
 
 `tests/example_renderer` is one, to copy: `pip install` it beside crossray, and every command knows `my-tracer`. Its
-adapter may use `reference.scene`, `reference.text` and this module. What it does wrong costs its own pictures only.
+adapter may use `reference.scene`, `reference.text`, `translator.likeness` and this module. What it does wrong costs
+its own pictures only.
 """
 
 from __future__ import annotations

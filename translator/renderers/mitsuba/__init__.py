@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from importlib import resources
-from itertools import combinations
 from typing import Any
 
 from reference.scene import (
@@ -19,6 +18,7 @@ from reference.scene import (
     distinct_spheres,
 )
 from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single, source
+from translator.likeness import find_alike
 
 TITLE = "Mitsuba 3"
 LICENCE = "BSD-3-Clause"
@@ -151,24 +151,8 @@ def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Sett
             raise Unsupported(f"{COARSE} within {PLANE_LIGHT_GAP} of the light: {name} passes at {abs(gap):g}")
         if abs(x) + abs(y) < APART / SCREEN and abs(offset - SCREEN_DISTANCE * z) < APART:
             raise Unsupported(f"{COARSE} to tell {name} from the screen")
-    _refuse_close_pairs(spheres, planes)
-
-
-def _refuse_close_pairs(spheres: dict[str, Sphere], planes: dict[str, Plane]) -> None:
-    """Surfaces that single precision cannot tell apart; spheres are compared along x first."""
-    ordered = sorted(spheres.items(), key=lambda item: item[1].centre[0])
-    for place, (name, one) in enumerate(ordered):
-        for other_name, other in ordered[place + 1 :]:
-            if other.centre[0] - one.centre[0] >= APART:
-                break
-            if math.dist(one.centre, other.centre) + abs(one.radius - other.radius) < APART:
-                raise Unsupported(f"{COARSE} to tell {name} from {other_name}")
-    for (name, plane), (other_name, other_plane) in combinations(planes.items(), 2):
-        normal, other_normal = plane.unit_normal, other_plane.unit_normal
-        sign = math.copysign(1, sum(a * b for a, b in zip(normal, other_normal, strict=True)))
-        turned = math.dist(normal, [sign * value for value in other_normal])
-        if turned < APART / SCREEN and abs(plane.distance_from(EYE) - sign * other_plane.distance_from(EYE)) < APART:
-            raise Unsupported(f"{COARSE} to tell {name} from {other_name}")
+    if pair := find_alike(spheres, planes, APART):
+        raise Unsupported(f"{COARSE} to tell {pair[0]} from {pair[1]}")
 
 
 def _slants_through_eye(plane: Plane) -> bool:
