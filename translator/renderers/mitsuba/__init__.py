@@ -51,6 +51,8 @@ HEADER = """\
 <scene version="3.0.0">
   <integrator type="whitted">
     <integer name="max_depth" value="{depth}"/>
+    <!-- The height of a pixel over its width; 1 + 2^-20 times that if a slanting plane goes through the eye, as rays
+         that run within the plane would meet it by rounding. -->
     <float name="stretch" value="{stretch}"/>
   </integrator>
 
