@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ def test_it_agrees_with_the_truth_and_refuses_what_it_cannot_do(run: Run, tmp_pa
     *drawn, refused = reported(tmp_path).values()
     assert [picture["pixels"]["unexplained"] for picture in drawn] == [0] * 3
     for picture in drawn:
-        assert picture["limits"] == {"precision": 2.0**-44, "gap": 0, "far": 0}
+        assert picture["limits"] == asdict(Limits(2.0**-44)) | {"origin": [0, 0, 0]}
         assert 0 < picture["trace_seconds"] < picture["seconds"]
     reason = "my tracer decides by rounding whether sphere 1 hides the light, which lies on it"
     assert (refused["status"], refused["reason"]) == ("unsupported", reason)

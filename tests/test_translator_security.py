@@ -219,8 +219,11 @@ def test_exported_lines_work_in_a_hostile_world(tmp_path: Path, peaceful: dict[s
         picture = read_image(tmp_path / "work/export" / name / image)
         np.testing.assert_allclose(picture, peaceful[name], atol=1e-4, err_msg=name)
     after = snapshot(tmp_path)
-    changed = ("work/export", "home/.drjit")  # Dr.Jit keeps its compiled kernels in the user's home
+    # In the user's home Dr.Jit keeps compiled kernels, and Blender makes folders for thumbnails, besides temporary files.
+    changed = ("work/export", "home/.drjit", "home/thumbnails", "tmp")
     assert without(after, *changed) == without(before, *changed)
+    assert not list((tmp_path / "tmp").iterdir())
+    assert not any(path.is_file() for path in (tmp_path / "home/thumbnails").rglob("*"))
 
 
 @pytest.mark.parametrize("case", NAMES)
