@@ -219,7 +219,7 @@ def test_exported_lines_work_in_a_hostile_world(tmp_path: Path, peaceful: dict[s
         picture = read_image(tmp_path / "work/export" / name / image)
         np.testing.assert_allclose(picture, peaceful[name], atol=1e-4, err_msg=name)
     after = snapshot(tmp_path)
-    # In the user's home Dr.Jit keeps compiled kernels and Blender makes folders for thumbnails. Temporary files are gone.
+    # In the user's home Dr.Jit keeps compiled kernels and Blender makes folders for thumbnails.
     changed = ("work/export", "home/.drjit", "home/thumbnails", "tmp")
     assert without(after, *changed) == without(before, *changed)
     assert not list((tmp_path / "tmp").iterdir())
