@@ -184,7 +184,7 @@ REFUSED = {
         "mitsuba",
         scene_of(FLOOR, wall(499.75, 7)),
         3,
-        "Mitsuba's single precision is too coarse within 0.5 of the light: plane 2 passes at 0.25",
+        "Mitsuba's single precision is too coarse within 1 of the light: plane 2 passes at 0.25",
     ),
     "mitsuba depth between balls": (
         "mitsuba",

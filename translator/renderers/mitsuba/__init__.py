@@ -39,7 +39,7 @@ FARTHEST = 1e6  # of a sphere
 FARTHEST_PLANE = 1e4  # slanting rays meet it much farther away
 LARGEST_RADIUS = 2000  # the surface of a larger sphere shades itself
 SPHERE_LIGHT_GAP = 25  # grazing shadow rays end that much before the light
-PLANE_LIGHT_GAP = 0.5
+PLANE_LIGHT_GAP = 1
 APART = 1e-3  # between surfaces that look alike
 
 HEADER = """\
