@@ -430,7 +430,8 @@ def main() -> None:
         sys.stdout.reconfigure(errors="surrogateescape")  # file names can be any bytes
     try:
         for number in SIGNALS:
-            signal.signal(number, _stop)
+            if signal.getsignal(number) != signal.SIG_IGN:  # as nohup and shells in the background have them
+                signal.signal(number, _stop)
         app()
     except _Stopped as stop:
         _fail("interrupted", SIGNALLED + stop.number)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import errno
 import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -15,6 +16,8 @@ from reference.errors import OutputError
 UMASK = os.umask(0o077)  # which can only be read by changing it, for all threads
 os.umask(UMASK)
 
+_begun: set[Path] = set()  # temporary files that may exist
+
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
@@ -23,16 +26,15 @@ def replacing(path: str | Path) -> Iterator[Path]:
     Raises OutputError where the file cannot be written; what stood at `path` is then still there.
     """
     target = Path(os.path.realpath(path))
-    temporary = None
+    temporary = target.parent / f".crossray-{secrets.token_hex(8)}{target.suffix}"
+    _begun.add(temporary)  # before it is there: a signal may end the program at any moment
     try:
         if target.exists() and not target.is_file():
             found = "a directory" if target.is_dir() else "a device"
             raise OutputError(f"{path}: expected a file to write, found {found}")
         if target.exists() and not os.access(target, os.W_OK):
             raise OutputError(f"{path}: cannot be written: permission denied")
-        handle, name = tempfile.mkstemp(prefix=".crossray-", suffix=target.suffix, dir=target.parent)
-        os.close(handle)
-        temporary = Path(name)
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
         yield temporary
         if target.exists():
             shutil.copymode(target, temporary)
@@ -42,9 +44,20 @@ def replacing(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
     finally:
-        if temporary is not None:
-            with suppress(FileNotFoundError):
-                temporary.unlink()
+        _clear(temporary)
+
+
+def _clear(temporary: Path) -> None:
+    with suppress(OSError):
+        temporary.unlink()
+    _begun.discard(temporary)
+
+
+@atexit.register
+def _clear_all() -> None:
+    """What a signal kept from being cleared away."""
+    for temporary in list(_begun):
+        _clear(temporary)
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -13,9 +13,11 @@ import pytest
 from fakes import are_gone, hang, offer, wait_for
 from helpers import EXAMPLE
 
+from reference import files
 from reference.image import write_image
 from translator.process import usable_cores
 
+ENDED = "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN); import crossray; crossray.main()"
 RENDERER = """\
 #!/bin/sh
 [ $1 = --version ] && echo POV-Ray 9 && exit
@@ -23,6 +25,49 @@ echo $$ > {started}.part
 mv {started}.part {started}
 sleep 60
 """
+
+
+def interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_a_file_just_begun_is_cleared_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "close", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        files.write_text(tmp_path / "a.txt", "")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_clearing_away_missed_is_cleared_away_at_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", interrupt)
+        with pytest.raises(KeyboardInterrupt), files.replacing(tmp_path / "a.txt"):
+            raise ValueError
+    assert len(list(tmp_path.iterdir())) == 1
+    files._clear_all()
+    assert not list(tmp_path.iterdir())
+    assert not files._begun
+
+
+def test_a_signal_that_the_caller_ignores_is_ignored(tmp_path: Path) -> None:
+    """As under nohup."""
+    started, ended = tmp_path / "started", tmp_path / "ended"
+    program = tmp_path / "povray"
+    script = f"#!/bin/sh\n[ $1 = --version ] && echo POV-Ray 9 && exit\ntouch {started}\n"
+    program.write_text(f"{script}while ! [ -e {ended} ]; do sleep 0.05; done\nexit 7\n")
+    program.chmod(0o755)
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    command = [sys.executable, "-c", ENDED, "check", str(EXAMPLE), "--size", "8x8", "--with", "povray"]
+    with subprocess.Popen(
+        [*command, "--out", str(tmp_path / "out")], env=environment, stdout=subprocess.PIPE
+    ) as process:
+        wait_for(started)
+        process.send_signal(signal.SIGHUP)
+        time.sleep(0.2)
+        ended.touch()
+        said, _ = process.communicate(timeout=60)
+    assert process.returncode == 3
+    assert b"it failed with exit code 7" in said
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
