@@ -13,7 +13,6 @@ from reference.rules import Rules
 Verdict = bool | None  # None: the balls cannot tell
 
 ZERO, ONE = arb(0), arb(1)
-NOWHERE = -1  # in place of the surface that a ray leaves, where it starts off it
 
 
 class UndecidedError(Exception):
@@ -103,7 +102,7 @@ class Walk:
                 break
             weight = weight * surface.reflection
             d = self.loosened(mirrored(d, arm, surface))
-            origin, leaving = self.start(point, arm, d, hit.place)
+            origin, leaving = self.start(point, arm, d), hit.place
         return total
 
     def loosened(self, point: Point) -> Point:
@@ -120,7 +119,7 @@ class Walk:
         hits: list[Hit] = []
         for index, surface in self.tables.along(origin, d):
             if isinstance(surface, HeldSphere):
-                hits += _meet_sphere(index, surface, origin, d, dd, leaving, window)
+                hits += _meet_sphere(index, surface, origin, d, dd, leaving, window, bool(self.rules.ahead))
             elif index != leaving:
                 hits += _meet_plane(index, surface, origin, d, leaving, window)
         if self.rules.far:
@@ -152,19 +151,19 @@ class Walk:
             return ZERO
         if not cosine > 0:
             return ZERO.union(cosine.upper())  # whether or not something blocks it
-        start, left = self.start(point, arm, to_light, index)
-        if left != index:
-            to_light = minus(self.tables.light, start)
+        if self.rules.ahead:
+            point = self.start(point, arm, to_light)
+            to_light = minus(self.tables.light, point)
             distance = dot(to_light, to_light).sqrt()
-        return ZERO if self.blocked(start, to_light, distance, left) else cosine
+        return ZERO if self.blocked(point, to_light, distance, index) else cosine
 
-    def start(self, point: Point, arm: Point, d: Point, place: int) -> tuple[Point, int]:
-        """Where the ray along `d` starts that leaves a surface of normal `arm`, and the surface that it is on there."""
+    def start(self, point: Point, arm: Point, d: Point) -> Point:
+        """Where the ray along `d` starts that leaves a surface of normal `arm`: there, or off it on the side of `d`."""
         if not self.rules.ahead:
-            return point, place
+            return point
         largest = max(float(abs(a - ball(b)).mid()) for a, b in zip(point, self.rules.origin, strict=True))
         step = arb(self.rules.ahead * (1 + largest)) / dot(arm, arm).sqrt()
-        return along(point, -step if dot(arm, d) < 0 else step, arm), NOWHERE
+        return along(point, -step if dot(arm, d) < 0 else step, arm)
 
     def blocked(self, point: Point, to_light: Point, distance: arb, leaving: int) -> bool:
         """Whether a surface stands before the light; by choice where that is open."""
@@ -237,13 +236,16 @@ def _choose_hit(walk: Walk, ways: list[Hit | None]) -> Hit | None:
 
 
 def _meet_sphere(
-    index: int, sphere: HeldSphere, origin: Point, d: Point, dd: arb, leaving: int | None, window: _Window
+    index: int, sphere: HeldSphere, origin: Point, d: Point, dd: arb, leaving: int | None, window: _Window, off: bool
 ) -> Iterator[Hit]:
-    """The roots that may count, up to the first that surely does if the ray meets the sphere at all."""
+    """The roots that may count, up to the first that surely does if the ray meets the sphere at all.
+
+    A ray that starts off the sphere that it leaves does so outside and away from it, or inside.
+    """
     p = minus(origin, sphere.centre)
     half = dot(p, d)
     sure = True
-    if index == leaving:
+    if index == leaving and not (off and half < 0):
         roots = [-2 * half / dd]
     else:
         constant = sphere.at_eye if leaving is None else dot(p, p) - sphere.radius**2
@@ -252,7 +254,7 @@ def _meet_sphere(
             return
         sure = bool(squared > 0)
         root = squared.sqrt() if sure else ZERO.union(squared.upper().sqrt())
-        roots = [(-half - root) / dd, (root - half) / dd]
+        roots = [(-half - root) / dd, (root - half) / dd][index == leaving :]
     for t in roots:
         counts, clear = bool(t > window.least), bool(t > window.clear)
         if counts or not t < window.least:

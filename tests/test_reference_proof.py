@@ -414,3 +414,19 @@ def test_spheres_are_passed_over_only_where_they_are_missed(rules: Rules, monkey
 
 def test_many_spheres_and_one_far_away() -> None:
     assert prove(many_spheres(Sphere(RED, (0, 0, 3e200), 2e200, 0, 0)), 6, 6, 12, 12).proven
+
+
+def test_a_ray_that_starts_off_its_surface_never_meets_it_by_rounding() -> None:
+    """Two round mirrors magnify the error until the last start is less sure than it is off its surface."""
+    prover = Prover(Scene.load(ROOT / "scenes" / "example3.txt"), width=32, height=32)
+    (usual,) = prover.admissible(25, 26).colours
+    (colour,) = prover.admissible(25, 26, Rules(precision=2.0**-24, ahead=2.0**-13, origin=(0, -100, 250))).colours
+    assert colour.value == pytest.approx(usual.value, abs=0.01)
+    assert max(colour.radius) < 0.01
+
+
+def test_a_ray_that_starts_off_its_sphere_meets_it_from_inside() -> None:
+    ball = Sphere((0, 0, 0), (0, 0, 0), 200, 0, 1)
+    prover = Prover(Scene((255, 255, 255), 1, (ball,)), width=1, height=1, depth=2)
+    rays = prover.admissible(0, 0, Rules(ahead=2.0**-13)).rays
+    assert [ray.hit.place for ray in rays if ray.hit] == [0, 0, 0]
