@@ -27,6 +27,7 @@ SIZES = (0.0, *(2.0**-power for power in (8, 6, 4, 2, 0)))  # of the errors with
 TRIES = 64  # starts of each size; the one that comes nearest is followed
 PROBE = 2.0**-10  # how far errors are varied to see what they do
 STEPS = 6  # of Newton's method
+STRAY = 16.0  # how far over the precision the errors may be on the way to such as are not
 MET = 0.01  # levels
 
 
@@ -62,10 +63,10 @@ class _Search:
         """Errors near those that meet the goal, none of them over 1: at each step the least change that would do."""
         for _ in range(STEPS):
             miss = self.miss(errors)
-            if not (np.isfinite(miss).all() and np.abs(errors).max() <= 1):
+            if not (np.isfinite(miss).all() and np.abs(errors).max() <= STRAY):
                 return None
             if np.abs(miss).max() <= MET:
-                return errors
+                return errors if np.abs(errors).max() <= 1 else None
             probes = PROBE * np.eye(errors.size).reshape(-1, *errors.shape)
             slopes = np.array([miss - self.miss(errors + probe) for probe in probes]).T / PROBE
             if not np.isfinite(slopes).all():

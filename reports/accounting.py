@@ -29,6 +29,7 @@ STEPS = (2.0**-8, 2.0**-4, 1.0)  # of the declared precision: the smallest that 
 CLOSE = 0.1  # levels: how near a renderer must come to the colour of another branch
 WEAK = 0.5  # levels: a colour that leeway makes wider than this is no evidence
 GIVE_UP = 16_000  # unexplained pixels times surfaces; what is left then is not examined
+GIVE_UP_PATHS = 400  # unexplained pixels times the square of the rays on a path; then no paths are searched any more
 
 
 class Reason(NamedTuple):
@@ -45,34 +46,44 @@ def account(
 
     `limits` are what the renderer declared: `precision`, the relative error of its points and directions; `gap` and
     `far`, the distances from the start of a ray up to which and from which on it may miss things; `ahead` and `origin`,
-    where its rays start. After very many
-    unexplained pixels the rest counts as unexplained too.
+    where its rays start. After many unexplained pixels no paths with errors are searched for the rest, and after very
+    many the rest counts as unexplained, too.
     """
     most = max(50, GIVE_UP // max(1, prover.surfaces))
+    most_searched = max(5, GIVE_UP_PATHS // (prover.depth + 1) ** 2)
     reasons: list[Reason | None] = []
     unexplained = 0
     for row, column in places.tolist():
         red, green, blue = map(float, picture[row, column])
-        reason = explain_pixel(prover, limits, column, row, (red, green, blue)) if unexplained < most else None
+        value, search = (red, green, blue), unexplained < most_searched
+        reason = explain_pixel(prover, limits, column, row, value, search) if unexplained < most else None
         unexplained += reason is None
         reasons.append(reason)
     return reasons
 
 
-def explain_pixel(prover: Prover, limits: Mapping[str, Any], column: int, row: int, value: Triple) -> Reason | None:
-    """Which class holds `value`, the colour that a renderer gave a pixel; None for no class."""
+def explain_pixel(
+    prover: Prover, limits: Mapping[str, Any], column: int, row: int, value: Triple, search: bool = True
+) -> Reason | None:
+    """Which class holds `value`, the colour that a renderer gave a pixel; None for no class.
+
+    Without `search` no paths with errors are searched, which takes long.
+    """
     if not all(map(math.isfinite, value)):
         return None
     truth = prover.admissible(column, row)
     if not truth.proven and not truth.exhausted and any(_holds(colour, value) for colour in truth.colours):
         number = f"{len(truth.colours)}" if truth.complete else f"at least {len(truth.colours)}"
         return Reason(KNIFE_EDGE, f"one of {number} admissible colours")
-    if _explains(prover.admissible(column, row, DOCUMENT_RULES), truth, value, TOLERANCE):
+    if _explains(prover.admissible(column, row, DOCUMENT_RULES), truth.colours, value, TOLERANCE):
         return Reason(DOCUMENT_WINDOW, "the colour by the document's text")
     precision, gap, far, ahead = (limits.get(name, 0.0) for name in ("precision", "gap", "far", "ahead"))
     start = Rules(ahead=ahead, origin=tuple(limits.get("origin", EYE)))
-    if ahead and any(_is_evidence(colour, value) for colour in prover.admissible(column, row, start).colours):
-        return Reason(LIMIT, f"the colour by rays that start off their surface, by {ahead:g} of the coordinates")
+    usual = truth.colours
+    if ahead:
+        usual += prover.admissible(column, row, start).colours
+        if any(_is_evidence(colour, value) for colour in usual):
+            return Reason(LIMIT, f"the colour by rays that start off their surface, by {ahead:g} of the coordinates")
     for kind, sight in ((PRECISION, start), (LIMIT, replace(start, gap=gap, far=far))):
         widest = replace(sight, precision=precision)
         if not widest.has_leeway or (kind == LIMIT and not sight.has_leeway):
@@ -82,18 +93,18 @@ def explain_pixel(prover: Prover, limits: Mapping[str, Any], column: int, row: i
             continue
         for step in (0.0, *STEPS) if sight.has_leeway else STEPS:
             rules = replace(sight, precision=precision * step)
-            if not found.proven and _explains(prover.admissible(column, row, rules), truth, value, CLOSE):
+            if not found.proven and _explains(prover.admissible(column, row, rules), usual, value, CLOSE):
                 return Reason(kind, f"the other side of a branch, reached by {_evidence(rules)}")
-        agrees = any(_holds(colour, value) for colour in truth.colours)
-        if kind == PRECISION and not agrees and (error := find_error(prover, column, row, value, widest)):
+        searched = search and kind == PRECISION and not any(_holds(colour, value) for colour in truth.colours)
+        if searched and (error := find_error(prover, column, row, value, widest)):
             return Reason(kind, f"a path with errors of up to 2^{math.log2(error):.1f} of the coordinates")
     return None
 
 
-def _explains(other: Admissible, truth: Admissible, value: Triple, tolerance: float) -> bool:
-    """Whether the value is a sharp colour of a branch that does not agree with the truth."""
+def _explains(other: Admissible, usual: tuple[Colour, ...], value: Triple, tolerance: float) -> bool:
+    """Whether the value is a sharp colour of a branch that does not agree with the usual ones."""
     return any(
-        _is_evidence(colour, value, tolerance) and not any(_holds(colour, right.value) for right in truth.colours)
+        _is_evidence(colour, value, tolerance) and not any(_holds(colour, right.value) for right in usual)
         for colour in other.colours
     )
 

@@ -11,7 +11,7 @@ from reference.proof import Prover
 from reference.rules import Rules
 from reference.scene import Triple
 from reference.witness import _Search, find_error
-from reports.accounting import PRECISION, explain_pixel
+from reports.accounting import PRECISION, account, explain_pixel
 from translator.contract import Limits
 
 FLOOR = Plane((200, 180, 160), (0, -100, 0), (0, 1, 0), 1, 0.5)
@@ -84,3 +84,13 @@ def test_what_agrees_and_what_balls_exclude_is_not_searched(monkeypatch: pytest.
     (seen,) = prover.admissible(*floor).colours
     red, green, blue = seen.value
     assert explain_pixel(prover, asdict(Limits(SINGLE.precision)), *floor, (red + 0.6, green, blue)) is None
+
+
+def test_searches_in_vain_come_to_an_end(monkeypatch: pytest.MonkeyPatch, prover: Prover) -> None:
+    searched = []
+    monkeypatch.setattr(reports.accounting, "find_error", lambda *_: searched.append(1))
+    column, row = PIXEL
+    wrong = np.full((row + 1, column + 1, 3), np.array(truth(prover)) + 2)
+    reasons = account(prover, asdict(Limits(SINGLE.precision)), wrong, np.array([(row, column)] * 60))
+    assert reasons == [None] * 60
+    assert len(searched) == 400 // (DEPTH + 1) ** 2
