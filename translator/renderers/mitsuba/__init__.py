@@ -34,7 +34,6 @@ LIMITS = Limits(precision=2.0**-20, gap=0.1, far=0.9 * PLANE_RADIUS)
 # What single precision carries, found by comparing pictures.
 COARSE = "Mitsuba's single precision is too coarse"
 DEEPEST = 16  # bounces
-DEEPEST_BETWEEN_BALLS = 4  # bounces, where several spheres mirror each other and each magnifies the error
 FARTHEST = 1e6  # of a sphere
 FARTHEST_PLANE = 1e4  # slanting rays meet it much farther away
 LARGEST_RADIUS = 2000  # the surface of a larger sphere shades itself
@@ -132,11 +131,8 @@ def export(scene: Scene, settings: Settings) -> Export:
 
 def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:
     """Single precision bounds how deep, how far, how close together and how near the light a scene may go."""
-    balls = sum(sphere.reflection != 0 for sphere in spheres.values())
-    deepest = DEEPEST if balls < 2 else DEEPEST_BETWEEN_BALLS
-    if settings.depth > deepest:
-        mirrors = "" if balls < 2 else f" between {balls} mirroring spheres"
-        raise Unsupported(f"{COARSE} for {settings.depth} bounces{mirrors} (at most {deepest})")
+    if settings.depth > DEEPEST:
+        raise Unsupported(f"{COARSE} for {settings.depth} bounces (at most {DEEPEST})")
     for name, sphere in spheres.items():
         if max(map(abs, sphere.centre)) + sphere.radius > FARTHEST:
             raise Unsupported(f"{COARSE} beyond {FARTHEST:g}: {name} reaches farther")
