@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from reference import EXACT, Scene, render
+from translator.run import installed_version
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "scenes" / "example1.txt"
@@ -63,6 +64,12 @@ def need(program: str) -> str:
 def need_module(name: str) -> None:
     """Go on only with a Python package; without it the test is skipped, and in continuous integration it fails."""
     if find_spec(name) is None:
+        _miss(name)
+
+
+def need_renderer(name: str) -> None:
+    """Go on only with that renderer; without it the test is skipped, and in continuous integration it fails."""
+    if installed_version(name) is None:
         _miss(name)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 import pytest
-from helpers import ROOT, need
+from helpers import ROOT, need, need_renderer
 from typer.testing import CliRunner
 
 from crossray import app
@@ -20,6 +20,7 @@ from reference.image import write_image
 from reference.model import Model, Number
 from reference.scene import merge_coincident
 from translator.contract import PYTHON, Export, Settings
+from translator.registry import adapter
 from translator.renderers import native, povray
 
 EXAMPLES = sorted((ROOT / "scenes").glob("example?.txt"))
@@ -152,6 +153,58 @@ def test_bug_in_our_tracer(name: str, path: Path, tmp_path: Path, monkeypatch: p
 
     monkeypatch.setattr(native, "export", export)
     code, (comparison,) = check(path, tmp_path, "native")
+    is_found(code, comparison)
+
+
+def of_spheres(**factors: float) -> Callable[[Scene], Scene]:
+    """Each sphere with these values multiplied."""
+
+    def change(scene: Scene) -> Scene:
+        changed = (
+            replace(ball, **{name: getattr(ball, name) * factors[name] for name in factors}) for ball in scene.spheres
+        )
+        return replace(scene, spheres=tuple(changed))
+
+    return change
+
+
+def tilt_more(scene: Scene) -> Scene:
+    return tilt(tilt(scene))
+
+
+CHANGES: dict[str, Callable[[Scene], Scene]] = {
+    "kd x 0.97": of_spheres(diffuse=0.97),
+    "radius x 1.002": of_spheres(radius=1.002),
+    "a normal tilted by 0.2 degrees": tilt_more,
+}
+LAMPS = {  # files and what in them moves the light by 20
+    "cycles": ("scene.py", "LIGHT = (500,", "LIGHT = (520,"),
+    "mitsuba": ("scene.xml", 'value="500.0 ', 'value="520.0 '),
+    "mitsuba-stock": ("light.xml", 'name="position" value="500.0 ', 'name="position" value="520.0 '),
+    "radiance": ("light.rad", "4 500.0 ", "4 520.0 "),
+    "tachyon": ("scene.dat", "LIGHT CENTER 500.0 ", "LIGHT CENTER 520.0 "),
+}
+
+
+@pytest.mark.parametrize("change", [*CHANGES, "light + 20"])
+@pytest.mark.parametrize("name", LAMPS)
+def test_bug_in_another_renderer(name: str, change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    need_renderer(name)
+    module = adapter(name)
+    right = module.export
+
+    def export(scene: Scene, settings: Settings) -> Export:
+        exported = right(scene, settings)
+        if change in CHANGES:
+            files = right(CHANGES[change](scene), settings).files
+        else:
+            file, old, new = LAMPS[name]
+            files = {**exported.files, file: exported.files[file].replace(old, new)}
+        assert files != exported.files
+        return replace(exported, files=files)
+
+    monkeypatch.setattr(module, "export", export)
+    code, (comparison,) = check(EXAMPLES[2], tmp_path, name, size="24x24")
     is_found(code, comparison)
 
 
