@@ -124,11 +124,12 @@ def test_what_cannot_be_carried_is_refused_with_the_reason(case: str) -> None:
 
 
 def test_bounces_between_mirroring_spheres() -> None:
-    reason = "too coarse for 5 bounces between 2 mirroring spheres .at most 4."
-    balls = scene_of(BALL, ball(90, 0, 300, 40, 0.5))
-    with pytest.raises(Unsupported, match=reason):
-        export(balls, replace(SETTINGS, depth=5))
-    export(balls, replace(SETTINGS, depth=4))
+    for count, deepest in ((2, 8), (19, 8), (20, 4)):
+        balls = scene_of(*(ball(90 * place, 0, 300, 40, 0.5) for place in range(count)))
+        reason = f"too coarse for {deepest + 1} bounces between {count} mirroring spheres .at most {deepest}."
+        with pytest.raises(Unsupported, match=reason):
+            export(balls, replace(SETTINGS, depth=deepest + 1))
+        export(balls, replace(SETTINGS, depth=deepest))
     export(scene_of(BALL, FLOOR), replace(SETTINGS, depth=50))
 
 

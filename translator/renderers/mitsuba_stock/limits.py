@@ -15,7 +15,9 @@ RAY_EPSILON = 1500 * 2.0**-24  # rays start ahead of a point by this times 1 + i
 
 # What Mitsuba carries: one side of each surface, in single precision.
 COARSE = "Mitsuba's single precision is too coarse"
-DEEPEST_BETWEEN_BALLS = 4  # bounces, where several spheres mirror each other and each magnifies the error
+DEEPEST_BETWEEN_BALLS = 8  # bounces, where several spheres mirror each other and each magnifies the error
+MANY_BALLS = 20  # more ways lead between more of them
+DEEPEST_BETWEEN_MANY = 4  # bounces
 FARTHEST = 1e6  # of a sphere
 LARGEST_RADIUS = 2000
 APART = 1e-3  # between a surface and the screen
@@ -29,10 +31,10 @@ def refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Setti
     if settings.width != settings.height:
         raise Unsupported("Mitsuba's camera has square pixels, so that a square screen needs a square picture")
     balls = sum(sphere.reflection != 0 for sphere in spheres.values())
-    if balls > 1 and settings.depth > DEEPEST_BETWEEN_BALLS:
-        raise Unsupported(
-            f"{COARSE} for {settings.depth} bounces between {balls} mirroring spheres (at most {DEEPEST_BETWEEN_BALLS})"
-        )
+    deepest = DEEPEST_BETWEEN_BALLS if balls < MANY_BALLS else DEEPEST_BETWEEN_MANY
+    if balls > 1 and settings.depth > deepest:
+        between = f"{settings.depth} bounces between {balls} mirroring spheres"
+        raise Unsupported(f"{COARSE} for {between} (at most {deepest})")
     for name, sphere in spheres.items():
         if math.hypot(*sphere.centre) + sphere.radius > FARTHEST:
             raise Unsupported(f"{COARSE} beyond {FARTHEST:g}: {name} reaches farther")
