@@ -154,8 +154,8 @@ FAINT = "Cycles leaves out what is fainter than 1e-05: {} has such a coefficient
 REFUSED = {
     "depth": (
         scene_of(MIRROR),
-        Settings(64, 64, 51),
-        "Cycles draws a layer for each bounce, and layers for 51 take too long",
+        Settings(64, 64, 25),
+        "Cycles' single precision is too coarse for 25 bounces (at most 24)",
     ),
     "small": (scene_of(BALL), Settings(64, 3), "Blender's pictures have at least 4x4 pixels"),
     "narrow": (
@@ -221,10 +221,10 @@ REFUSED = {
     ),
 }
 CARRIED = {
-    "deepest": (scene_of(MIRROR), Settings(64, 64, 50)),
+    "deepest": (scene_of(MIRROR), Settings(64, 64, 24)),
     "smallest": (scene_of(BALL), Settings(4, 800)),
     "many mirrors": (scene_of(*[replace(MIRROR, radius=place + 9) for place in range(30)]), SETTINGS),
-    "deep mirrors": (scene_of(*[replace(MIRROR, radius=place + 9) for place in range(19)]), Settings(64, 64, 50)),
+    "deep mirrors": (scene_of(*[replace(MIRROR, radius=place + 9) for place in range(19)]), Settings(64, 64, 24)),
     "sphere before the screen": (scene_of(ball(10, 0, 94, 5)), SETTINGS),
     "eye in a small sphere": (scene_of(ball(0, 0, 0, 99)), SETTINGS),
     "sphere between pixels": (scene_of(ball(0, 0, 100, 0.5)), SETTINGS),

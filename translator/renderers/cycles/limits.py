@@ -24,7 +24,7 @@ FAINTEST = 1e-5  # CLOSURE_WEIGHT_CUTOFF: Cycles leaves out what has a smaller c
 SMALLEST_SIDE = 4  # pixels
 NARROWEST = 200  # pixels that are so many times as wide as high, or as high as wide
 MOST_THREADS = 1024
-DEEPEST = 50  # bounces: each is drawn by itself
+DEEPEST = 24  # bounces: some pixels of many mirrors are wrong after 50, and each bounce is drawn by itself
 
 
 def refuse(
@@ -49,7 +49,7 @@ def refuse(
 def _refuse_settings(settings: Settings, bounces: int) -> None:
     width, height = settings.width, settings.height
     if bounces > DEEPEST:
-        raise Unsupported(f"Cycles draws a layer for each bounce, and layers for {bounces} take too long")
+        raise Unsupported(f"{COARSE} for {bounces} bounces (at most {DEEPEST})")
     if min(width, height) < SMALLEST_SIDE:
         raise Unsupported(f"Blender's pictures have at least {SMALLEST_SIDE}x{SMALLEST_SIDE} pixels")
     if max(width, height) > NARROWEST * min(width, height):
