@@ -99,7 +99,7 @@ def limits() -> list[list[str]]:
         exports = (exported(name, scene) for scene in (*EXAMPLES, *DIAGNOSTIC))
         declared = [export.limits for export in exports if isinstance(export, Export)] or [Limits()]
         plain = "{:.3g}".format
-        written = {"precision": _power, "ahead": plain, "gap": plain, "far": _distance}
+        written = {"precision": _power, "ahead": plain, "short": plain, "gap": plain, "far": _distance}
         ranges = (_range([getattr(one, field) for one in declared], text) for field, text in written.items())
         rows.append([_title(name), *ranges])
     return rows
@@ -194,7 +194,7 @@ def page() -> str:
 
 
 RENDERERS = ("renderer", "name", "to install it", "licence", "version", "size", "with all that it needs")
-LIMITS = ("renderer", "relative precision", "starts ahead by", "sees from", "to")
+LIMITS = ("renderer", "relative precision", "starts ahead by", "ends short by", "sees from", "to")
 PARTS = """\
 # The renderers
 
@@ -207,8 +207,9 @@ package libraries that not every Debian has.
 ## What their arithmetic cannot do better
 
 Each adapter declares for each scene the relative error that points and directions may have, how far off a surface rays
-start that leave it, as a share of the coordinates, and the distances up to which and from which on a ray may miss
-things, in the assignment's units. Where that explains a pixel, it is explained; see [docs/truth.md](truth.md).
+start that leave it, as a share of the coordinates, how far before the light shadow rays end, as a share of the way, and
+the distances up to which and from which on a ray may miss things, in the assignment's units. Where that explains a
+pixel, it is explained; see [docs/truth.md](truth.md).
 
 {limits}
 ## How they agree on the document's examples

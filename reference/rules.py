@@ -13,7 +13,8 @@ class Rules:
 
     `shadow`: blockers count from this share of the way to the light. `reflection`: what mirrors show counts from this
     distance. `grazing`: planes with |d.n| up to this are missed. `ahead`: shadow and mirrored rays start off their
-    surface, along its normal, by this times 1 + the largest coordinate of the point as seen from `origin`.
+    surface, along its normal, by this times 1 + the largest coordinate of the point as seen from `origin`. `short`:
+    blockers that are nearer to the light than this share of the way do not count.
 
     The others are leeway, within which every outcome is admissible: `precision`: relative error of each point and
     direction. `gap`: what is nearer than this to the start of a secondary ray may count or not. `far`, unless 0: what
@@ -28,6 +29,7 @@ class Rules:
     far: float = 0.0
     ahead: float = 0.0
     origin: Triple = (0.0, 0.0, 0.0)
+    short: float = 0.0
 
     @property
     def has_leeway(self) -> bool:

@@ -167,6 +167,8 @@ class Walk:
 
     def blocked(self, point: Point, to_light: Point, distance: arb, leaving: int) -> bool:
         """Whether a surface stands before the light; by choice where that is open."""
+        if self.rules.short:
+            to_light = minus(along(self.tables.light, ball(-self.rules.short), to_light), point)
         start = ball(self.rules.shadow)
         late = max(start, arb(self.rules.gap) / distance, key=lambda share: float(share.upper()))
         doubts = []
@@ -187,13 +189,14 @@ class Walk:
     ) -> tuple[Verdict, bool]:
         """Whether the surface is met at start < t < 1, and whether it is so by the model's rule for ties."""
         if isinstance(surface, HeldSphere):
-            return _sphere_blocks(surface, point, to_light, left, start)
+            return _sphere_blocks(surface, point, to_light, left, start, bool(self.rules.short))
         if left or surface.from_light.is_zero():
             return False, False
         side = surface.offset - dot(point, surface.normal)
         if self.rules.grazing and abs(side - surface.from_light) <= arb(self.rules.grazing) * surface.length:
             return False, False
-        return _opposite(side * (1 - start) + surface.from_light * start, surface.from_light), False
+        at_end = side - dot(to_light, surface.normal) if self.rules.short else surface.from_light
+        return _opposite(side * (1 - start) + at_end * start, at_end), False
 
     def far_cosine(self, hit: Hit, origin: Point, d: Point) -> arb:
         """n.l of a plane at a distance of at least hit.t along d: at most its distance from the light over that."""
@@ -286,23 +289,29 @@ def _meet_plane(
     yield Hit(farther, index, sure=False, ruled=False, bounded=False)
 
 
-def _sphere_blocks(sphere: HeldSphere, point: Point, to_light: Point, left: bool, start: arb) -> tuple[Verdict, bool]:
-    """Whether dd t^2 + 2 half t + constant has a root in start < t < 1, by its signs; a double root counts."""
+def _sphere_blocks(
+    sphere: HeldSphere, point: Point, to_light: Point, left: bool, start: arb, short: bool
+) -> tuple[Verdict, bool]:
+    """Whether dd t^2 + 2 half t + constant has a root in start < t < 1, by its signs; a double root counts.
+
+    Unless the way is `short`, the light is at its end.
+    """
     p, dd = minus(point, sphere.centre), dot(to_light, to_light)
     half = dot(p, to_light)
     constant = ZERO if left else dot(p, p) - sphere.radius**2
-    if sphere.at_light.is_zero():  # one root is 1, so that the other is constant / dd
+    at_end = constant + 2 * half + dd if short else sphere.at_light
+    if at_end.is_zero():  # one root is 1, so that the other is constant / dd
         return not left and _both(_positive(constant - start * dd), _positive(dd - constant)), False
     if left and start.is_zero():
-        return _both(_positive(-half), _positive(sphere.at_light)), False
+        return _both(_positive(-half), _positive(at_end)), False
     slope, end_slope = half + dd * start, half + dd
     at_start = constant + (half + slope) * start
     squared = half * half - dd * constant
     if squared < 0:
         return False, False
-    if sphere.at_light < 0:
+    if at_end < 0:
         return _positive(at_start), False
-    if not sphere.at_light > 0:
+    if not at_end > 0:
         return None, False
     dips = _both(_positive(-slope), _positive(end_slope))
     if at_start < 0 or (dips and squared > 0):

@@ -45,9 +45,9 @@ def account(
     """A reason for each of `places` (row, column) of a picture in levels, None for those that are unexplained.
 
     `limits` are what the renderer declared: `precision`, the relative error of its points and directions; `gap` and
-    `far`, the distances from the start of a ray up to which and from which on it may miss things; `ahead` and `origin`,
-    where its rays start. After many unexplained pixels no paths with errors are searched for the rest, and after very
-    many the rest counts as unexplained, too.
+    `far`, the distances from the start of a ray up to which and from which on it may miss things; `ahead`, `origin` and
+    `short`, where its rays start and end. After many unexplained pixels no paths with errors are searched for the rest,
+    and after very many the rest counts as unexplained, too.
     """
     most = max(50, GIVE_UP // max(1, prover.surfaces))
     most_searched = max(5, GIVE_UP_PATHS // (prover.depth + 1) ** 2)
@@ -77,13 +77,16 @@ def explain_pixel(
         return Reason(KNIFE_EDGE, f"one of {number} admissible colours")
     if _explains(prover.admissible(column, row, DOCUMENT_RULES), truth.colours, value, TOLERANCE):
         return Reason(DOCUMENT_WINDOW, "the colour by the document's text")
-    precision, gap, far, ahead = (limits.get(name, 0.0) for name in ("precision", "gap", "far", "ahead"))
-    start = Rules(ahead=ahead, origin=tuple(limits.get("origin", EYE)))
+    precision, gap, far, ahead, short = (
+        limits.get(name, 0.0) for name in ("precision", "gap", "far", "ahead", "short")
+    )
+    start = Rules(ahead=ahead, origin=tuple(limits.get("origin", EYE)), short=short)
     usual = truth.colours
-    if ahead:
-        usual += prover.admissible(column, row, start).colours
-        if any(_is_evidence(colour, value) for colour in usual):
+    if ahead or short:
+        other = prover.admissible(column, row, start).colours
+        if any(_is_evidence(colour, value) for colour in other):
             return Reason(LIMIT, f"the colour by rays that start off their surface, by {ahead:g} of the coordinates")
+        usual += other
     for kind, sight in ((PRECISION, start), (LIMIT, replace(start, gap=gap, far=far))):
         widest = replace(sight, precision=precision)
         if not widest.has_leeway or (kind == LIMIT and not sight.has_leeway):

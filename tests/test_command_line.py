@@ -16,6 +16,7 @@ from helpers import EXAMPLE, ROOT, Finished, crossray, exact, need, pixels_over
 
 from reference import Scene
 from reference.image import read_image, write_image
+from translator.contract import Limits
 from translator.registry import renderer_names
 from translator.renderers import mitsuba, povray
 
@@ -91,7 +92,7 @@ def test_check_writes_reports_and_pictures(checked: tuple[Path, list[Finished]])
     facts = {name: scene[name] for name in ("scene", "path", "width", "height", "depth", "convention")}
     assert list(facts.values()) == ["example1", str(EXAMPLE), 64, 64, 3, "exact"]
     assert scene["reference"]["renderer"] == "certified"
-    assert scene["reference"]["limits"] == {"precision": 0, "gap": 0, "far": 0, "ahead": 0, "origin": [0, 0, 0]}
+    assert scene["reference"]["limits"] == asdict(Limits()) | {"origin": [0, 0, 0]}
     limits = {comparison["renderer"]: comparison["limits"] for comparison in scene["comparisons"]}
     declared = {"povray": asdict(povray.LIMITS), "mitsuba": asdict(mitsuba.LIMITS)}
     assert limits == json.loads(json.dumps(declared))

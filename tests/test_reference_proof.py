@@ -95,14 +95,33 @@ def test_proofs_of_random_scenes_agree_with_the_transcription(convention: str) -
         replace(DOCUMENT_RULES, reflection=5.0),
         replace(DOCUMENT_RULES, grazing=0.2),
         replace(DOCUMENT_RULES, ahead=0.01),
+        replace(DOCUMENT_RULES, short=0.95),
     ],
-    ids=["shadow", "reflection", "grazing", "ahead"],
+    ids=["shadow", "reflection", "grazing", "ahead", "short"],
 )
 def test_every_rule_matters(rules: Rules) -> None:
     """Larger than the document's they change pixels, so that agreement means something."""
     prover = Prover(Scene.load(ROOT / "scenes" / "diagnostic" / "touching_spheres.txt"), width=40, height=40)
     pixels = [(column, row) for column in range(40) for row in range(40)]
     assert any(prover.admissible(*pixel).colours != prover.admissible(*pixel, rules).colours for pixel in pixels)
+
+
+@pytest.mark.parametrize(
+    "blocker",
+    [
+        Sphere(BLUE, (450, 450, 490), 20, 1, 0),  # from .872 to .928 of the way
+        Sphere(BLUE, (350, 350, 470), 145, 1, 0),  # to .903
+        Plane(BLUE, (0, 0, 490), (0, 0, 1), 1, 0),  # at .9
+    ],
+)
+def test_blockers_beyond_the_end_of_a_shadow_ray_do_not_count(blocker: Sphere | Plane) -> None:
+    wall = Plane(RED, (0, 0, 400), (0, 0, 1), 0.5, 0)
+    lit, dark = shaded(RED, 0.5 * 100 / hypot(500, 500, 100)), shaded(RED, 0)
+    prover = Prover(scene(wall, blocker), width=1, height=1)
+    begins = 0.9 if isinstance(blocker, Plane) else 0.872 if blocker.radius == 20 else 0.497
+    for short, expected in ((0.0, dark), (1 - begins - 0.005, dark), (1 - begins + 0.005, lit)):
+        (colour,) = prover.admissible(0, 0, Rules(short=short)).colours
+        assert colour.value == pytest.approx(expected), short
 
 
 # Two surfaces at one distance

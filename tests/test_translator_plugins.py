@@ -250,7 +250,7 @@ def test_an_export_stays_in_its_folder(name: str) -> None:
 
 
 @pytest.mark.parametrize("value", [-1.0, float("inf"), float("nan")])
-@pytest.mark.parametrize("name", ["precision", "gap", "far", "ahead"])
+@pytest.mark.parametrize("name", ["precision", "gap", "far", "ahead", "short"])
 def test_limits_are_finite(name: str, value: float) -> None:
     with pytest.raises(ValueError, match="finite limits"):
         Limits(**{name: value})  # type: ignore[arg-type]

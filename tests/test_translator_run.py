@@ -5,6 +5,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -108,7 +109,7 @@ def test_rendered(draw: Draw, levels: Picture) -> None:
     assert outcome.command == f"{sys.executable} program.py 'two words'"
     assert outcome.log == "traced in 0.25 s\n"
     assert outcome.notes == ("a note",)
-    assert outcome.limits == {"precision": 2.0**-10, "gap": 0.5, "far": 0.0, "ahead": 0.0, "origin": (0.0, 0.0, 0.0)}
+    assert outcome.limits == asdict(Limits(2.0**-10, 0.5))
     assert outcome.summary is None
     assert outcome.picture is not None
     np.testing.assert_allclose(outcome.picture, levels, rtol=1e-6)

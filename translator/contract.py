@@ -55,8 +55,8 @@ class Limits:
     `precision`: the relative error that its points and directions may have. `gap`: how far from its start a shadow or
     mirrored ray may miss things, where the renderer starts its rays a little ahead. `far`: the distance from which on
     rays may miss things, 0 for none. `ahead`: shadow and mirrored rays start off their surface, along its normal, by
-    this times 1 + the largest coordinate of the point as seen from `origin`. Raises ValueError for what is no finite
-    number, or below 0.
+    this times 1 + the largest coordinate of the point as seen from `origin`. `short`: shadow rays end before the light
+    by this share of the way. Raises ValueError for what is no finite number, or below 0.
     """
 
     precision: float = 0.0
@@ -64,9 +64,10 @@ class Limits:
     far: float = 0.0
     ahead: float = 0.0
     origin: Triple = EYE
+    short: float = 0.0
 
     def __post_init__(self) -> None:
-        sizes = (self.precision, self.gap, self.far, self.ahead)
+        sizes = (self.precision, self.gap, self.far, self.ahead, self.short)
         if not (all(0 <= value < math.inf for value in sizes) and all(map(math.isfinite, self.origin))):
             raise ValueError(f"expected finite limits from 0 on, found {self}")
 

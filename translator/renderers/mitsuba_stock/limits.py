@@ -12,6 +12,7 @@ PLANE_RADIUS = 1e9  # a plane is a disk of this radius
 CORNERS = [(x, y, SCREEN_DISTANCE) for x in (-SCREEN, SCREEN) for y in (-SCREEN, SCREEN)]
 
 RAY_EPSILON = 1500 * 2.0**-24  # rays start ahead of a point by this times 1 + its largest coordinate, along the normal
+SHADOW_EPSILON = 10 * RAY_EPSILON  # shadow rays end before the light by this share of the way
 
 # What Mitsuba carries: one side of each surface, in single precision.
 COARSE = "Mitsuba's single precision is too coarse"
@@ -23,7 +24,7 @@ LARGEST_RADIUS = 2000
 APART = 1e-3  # between a surface and the screen
 LIGHT_GAP = 10  # between a surface and the light
 # Single precision, as it adds up in interval arithmetic.
-LIMITS = Limits(precision=2.0**-20, far=0.9 * PLANE_RADIUS, ahead=RAY_EPSILON, origin=ORIGIN)
+LIMITS = Limits(2.0**-20, far=0.9 * PLANE_RADIUS, ahead=RAY_EPSILON, origin=ORIGIN, short=SHADOW_EPSILON)
 
 
 def refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:
