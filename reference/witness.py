@@ -23,10 +23,10 @@ from reference.walk import UnboundedError, UndecidedError, Walk
 Array = NDArray[np.float64]  # errors: for each point and direction in turn, as shares of the precision; or levels
 
 BITS = 128
-SIZES = (0.0, *(2.0**-power for power in (8, 6, 4, 2, 0)))  # of the errors with which a search starts
+SIZES = (0.0, *(2.0**power for power in range(-10, 5, 2)))  # of the errors with which a search starts
 TRIES = 64  # starts of each size; the one that comes nearest is followed
 PROBE = 2.0**-10  # how far errors are varied to see what they do
-STEPS = 6  # of Newton's method
+STEPS = 12  # of Newton's method
 STRAY = 16.0  # how far over the precision the errors may be on the way to such as are not
 MET = 0.01  # levels
 

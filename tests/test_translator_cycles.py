@@ -168,8 +168,8 @@ REFUSED = {
     "sphere at the screen's corner": (scene_of(ball(60, 60, 100, 15.5)), SETTINGS, INSIDE.format("sphere 1")),
     "many mirrors": (
         scene_of(*(ball(9 * place, 0, 300, 4, 0.5) for place in range(20))),
-        Settings(64, 48, 4),
-        "Cycles' single precision is too coarse for 4 bounces between 20 mirroring spheres (at most 3)",
+        Settings(64, 48, 6),
+        "Cycles' single precision is too coarse for 6 bounces between 20 mirroring spheres (at most 5)",
     ),
     "mirrors that meet on a line through the eye": (
         scene_of(

@@ -156,6 +156,12 @@ REFUSED = {
         17,
         "Mitsuba's single precision is too coarse for 17 bounces (at most 16)",
     ),
+    "mitsuba many mirrors": (
+        "mitsuba",
+        scene_of(*(mirror(30 * place) for place in range(20))),
+        6,
+        "Mitsuba's single precision is too coarse for 6 bounces between 20 mirroring spheres (at most 5)",
+    ),
     "mitsuba sphere too far": (
         "mitsuba",
         scene_of(NEAR, ball(0, -1e6, 0, 1)),

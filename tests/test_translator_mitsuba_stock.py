@@ -124,7 +124,7 @@ def test_what_cannot_be_carried_is_refused_with_the_reason(case: str) -> None:
 
 
 def test_bounces_between_mirroring_spheres() -> None:
-    for count, deepest in ((2, 8), (19, 8), (20, 4)):
+    for count, deepest in ((2, 8), (19, 8), (20, 5)):
         balls = scene_of(*(ball(90 * place, 0, 300, 40, 0.5) for place in range(count)))
         reason = f"too coarse for {deepest + 1} bounces between {count} mirroring spheres .at most {deepest}."
         with pytest.raises(Unsupported, match=reason):

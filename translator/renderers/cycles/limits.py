@@ -16,7 +16,7 @@ FARTHEST = 1e6  # of a sphere
 FARTHEST_PLANE = 1e8
 LARGEST_RADIUS = 5000
 MANY_BALLS = 20  # that mirror each other: each magnifies the error, and more ways lead between more of them
-DEEPEST_BETWEEN_BALLS = 3  # bounces, where there are so many
+DEEPEST_BETWEEN_BALLS = 5  # bounces, where there are so many
 APART = 1e-3  # between surfaces that look alike
 
 # What Blender and Cycles allow.

@@ -34,6 +34,8 @@ LIMITS = Limits(precision=2.0**-20, gap=0.1, far=0.9 * PLANE_RADIUS)
 # What single precision carries, found by comparing pictures.
 COARSE = "Mitsuba's single precision is too coarse"
 DEEPEST = 16  # bounces
+MANY_BALLS = 20  # that mirror each other: each magnifies the error, and more ways lead between more of them
+DEEPEST_BETWEEN_MANY = 5  # bounces
 FARTHEST = 1e6  # of a sphere
 FARTHEST_PLANE = 1e4  # slanting rays meet it much farther away
 LARGEST_RADIUS = 2000  # the surface of a larger sphere shades itself
@@ -131,8 +133,12 @@ def export(scene: Scene, settings: Settings) -> Export:
 
 def _refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Settings) -> None:
     """Single precision bounds how deep, how far, how close together and how near the light a scene may go."""
-    if settings.depth > DEEPEST:
-        raise Unsupported(f"{COARSE} for {settings.depth} bounces (at most {DEEPEST})")
+    balls = sum(sphere.reflection != 0 for sphere in spheres.values())
+    deepest, between = DEEPEST, ""
+    if balls >= MANY_BALLS:
+        deepest, between = DEEPEST_BETWEEN_MANY, f" between {balls} mirroring spheres"
+    if settings.depth > deepest:
+        raise Unsupported(f"{COARSE} for {settings.depth} bounces{between} (at most {deepest})")
     for name, sphere in spheres.items():
         if max(map(abs, sphere.centre)) + sphere.radius > FARTHEST:
             raise Unsupported(f"{COARSE} beyond {FARTHEST:g}: {name} reaches farther")
