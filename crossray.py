@@ -204,8 +204,8 @@ def export(
             refused += 1
             print(f"{name}: not exported: {reason}", file=sys.stderr)
             continue
-        write_export(exported, output / name)
         folder = output / name
+        write_export(exported, folder)
         place = str(folder) if folder.is_absolute() else f"./{folder}"  # CDPATH cannot lead elsewhere
         _print(f"(cd -- {shlex.quote(place)} && {command_line(exported)})")
         for note in exported.notes if verbose else ():

@@ -13,6 +13,7 @@ Triple = tuple[float, float, float]
 EYE: Triple = (0.0, 0.0, 0.0)
 SCREEN = 50.0  # half the width and height of the screen, centred on the z axis: x right, y up
 SCREEN_DISTANCE = 100.0  # from the eye along z, into the scene
+SCREEN_CORNERS = [(x, y, SCREEN_DISTANCE) for x in (-SCREEN, SCREEN) for y in (-SCREEN, SCREEN)]
 LIGHT: Triple = (500.0, 500.0, 500.0)  # white, without distance falloff
 LARGEST_SIDE = 1 << 16  # pixels
 LARGEST_DEPTH = 1 << 20  # bounces

@@ -1,6 +1,7 @@
 """Shared by the tests of translators, reports and the command line."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -12,11 +13,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from reference import EXACT, Scene, render
-from translator.run import installed_version
+from reference import EXACT, Plane, Scene, Sphere, render
+from reference.image import Picture
+from reference.scene import Triple
+from translator.contract import Settings
+from translator.run import Outcome, installed_version, run_renderer
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "scenes" / "example1.txt"
+EXPECTED = ROOT / "tests" / "expected"
+NUMBER = re.compile(r"(?<![\w.])-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?(?![\w.])")
 
 # Coloured ambient; a sphere before the screen; kr > 1; a twin of the second sphere that is listed later and vanishes;
 # a wall lit from the side that the eye does not see, its normal 5000 long; a floor that the screen cuts.
@@ -77,6 +83,32 @@ def _miss(name: str) -> NoReturn:
     if os.environ.get("CI") == "true":
         pytest.fail(f"{name} is not installed")
     pytest.skip(f"{name} is not installed")
+
+
+def scene_of(*surfaces: Sphere | Plane, ambient: Triple = (255, 255, 255)) -> Scene:
+    spheres = tuple(surface for surface in surfaces if isinstance(surface, Sphere))
+    planes = tuple(surface for surface in surfaces if isinstance(surface, Plane))
+    return Scene(ambient, 0.1, spheres, planes)
+
+
+def expect_text(file: str, text: str) -> None:
+    """The text is that of a file in `expected`, which CROSSRAY_REFRESH=1 writes anew."""
+    expected = EXPECTED / file
+    if os.environ.get("CROSSRAY_REFRESH") == "1":
+        expected.write_text(text, encoding="utf-8")
+    assert text == expected.read_text(encoding="utf-8")
+
+
+def rendered(name: str, scene: Scene, settings: Settings) -> tuple[Picture, Outcome]:
+    """The picture by the real renderer, asked for its version anew, and all that is told of it."""
+    installed_version.cache_clear()
+    outcome = run_renderer(name, scene, settings, 120)
+    assert outcome.status == "rendered", outcome
+    assert outcome.picture is not None
+    assert outcome.version
+    assert outcome.trace_seconds is not None
+    assert outcome.trace_seconds <= (outcome.seconds or 0)
+    return outcome.picture, outcome
 
 
 def exact(scene: Scene, width: int, height: int, depth: int = 3) -> NDArray[np.float64]:

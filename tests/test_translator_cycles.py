@@ -5,7 +5,6 @@ The expected files are checked by hand against their scenes. After a change on p
 """
 
 import ast
-import os
 import re
 from dataclasses import replace
 from importlib.util import find_spec
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import EXAMPLE, exact, pixels_over
+from helpers import EXAMPLE, EXPECTED, NUMBER, exact, expect_text, pixels_over, rendered, scene_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,12 +21,9 @@ from reference.image import Picture
 from reference.text import dump, parse
 from translator.contract import PYTHON, Settings, Unsupported
 from translator.renderers.cycles import export
-from translator.run import installed_version, run_renderer
 
-EXPECTED = Path(__file__).parent / "expected"
 ROOT = Path(__file__).parent.parent
 SETTINGS = Settings(64, 48, 3)
-NUMBER = re.compile(r"(?<![\w.])-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?(?![\w.])")
 pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
 
 # Coloured ambient; colours over 255; kr > 1; a sphere before the screen and a twin that vanishes; a wall lit from the
@@ -99,10 +95,7 @@ def calls(text: str) -> dict[str, list[dict[str, Any]]]:
 @pytest.mark.parametrize("name", SCENES)
 def test_export_is_as_expected(name: str) -> None:
     text = text_of(parse(SCENES[name]))
-    expected = EXPECTED / f"{name}.py.txt"
-    if os.environ.get("CROSSRAY_REFRESH") == "1":
-        expected.write_text(text, encoding="utf-8")
-    assert text == expected.read_text(encoding="utf-8")
+    expect_text(f"{name}.py.txt", text)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -134,12 +127,6 @@ def test_the_script_builds_the_scene_and_draws_it() -> None:
 def test_one_view_layer_is_enough_without_mirrors() -> None:
     assert calls(text_of(scene_of(BALL, FLOOR)))["studio"][0]["bounces"] == 0
     assert calls(text_of(scene_of(BALL, FLOOR), Settings(64, 48, 10**6)))["studio"][0]["bounces"] == 0
-
-
-def scene_of(*surfaces: Sphere | Plane) -> Scene:
-    spheres = tuple(surface for surface in surfaces if isinstance(surface, Sphere))
-    planes = tuple(surface for surface in surfaces if isinstance(surface, Plane))
-    return Scene((255, 255, 255), 0.1, spheres, planes)
 
 
 def ball(x: float, y: float, z: float, radius: float, reflection: float = 0) -> Sphere:
@@ -273,34 +260,29 @@ def test_only_numbers_of_a_scene_reach_the_file(scene: Scene) -> None:
     assert len(calls(text)["plane"]) <= len(scene.planes)  # it can be read, and holds literals only
 
 
-def rendered(scene: Scene, width: int, height: int, depth: int = 3) -> Picture:
+def drawn(scene: Scene, width: int, height: int, depth: int = 3) -> Picture:
     """The real thing, which may be missing: no Blender module comes for other Pythons than 3.11."""
     if find_spec("bpy") is None:
         pytest.skip("bpy is not installed")
-    installed_version.cache_clear()
-    outcome = run_renderer("cycles", scene, Settings(width, height, depth), 120)
-    assert outcome.status == "rendered", outcome
+    picture, outcome = rendered("cycles", scene, Settings(width, height, depth))
     assert outcome.version == "5.0.1"
-    assert outcome.picture is not None
-    assert outcome.trace_seconds is not None
-    assert outcome.trace_seconds <= (outcome.seconds or 0)
-    return outcome.picture
+    return picture
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_real_pictures_agree(name: str) -> None:
     scene = parse(SCENES[name])
-    assert pixels_over(exact(scene, 160, 90), rendered(scene, 160, 90), 0.05) == 0
+    assert pixels_over(exact(scene, 160, 90), drawn(scene, 160, 90), 0.05) == 0
 
 
 @pytest.mark.parametrize("name", ["plane_back", "eye_on_plane", "light_on_plane", "near_front"])
 def test_real_pictures_agree_in_corners(name: str) -> None:
     scene = Scene.load(ROOT / "scenes" / "diagnostic" / f"{name}.txt")
-    assert pixels_over(exact(scene, 80, 80), rendered(scene, 80, 80)) == 0
+    assert pixels_over(exact(scene, 80, 80), drawn(scene, 80, 80)) == 0
 
 
 @pytest.mark.parametrize("depth", [0, 12])
 def test_depth_counts_bounces(depth: int) -> None:
     scene = Scene.load(ROOT / "scenes" / "diagnostic" / "facing_mirrors.txt")
     truth = render(scene, EXACT, width=40, height=40, depth=depth)
-    assert pixels_over(truth, rendered(scene, 40, 40, depth)) == 0
+    assert pixels_over(truth, drawn(scene, 40, 40, depth)) == 0

@@ -14,7 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from helpers import EXAMPLE, TRICKY
+from helpers import EXAMPLE, EXPECTED, NUMBER, TRICKY, expect_text, scene_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -23,11 +23,9 @@ from reference.text import dump, parse
 from translator.contract import PYTHON, Settings, Unsupported
 from translator.registry import adapter, renderer_names
 
-EXPECTED = Path(__file__).parent / "expected"
 SCENES = {"example1": EXAMPLE.read_text(encoding="utf-8"), "tricky": TRICKY}
 WRITTEN = {"povray": ("scene.pov", ".pov"), "mitsuba": ("scene.xml", ".xml")}
 SETTINGS = Settings(64, 48, 3)
-NUMBER = re.compile(r"(?<![\w.])-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?(?![\w.])")
 pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
 PURE = """
 import json, os, sys
@@ -71,10 +69,7 @@ print(json.dumps(exports))
 def test_export_is_as_expected(renderer: str, scene: str) -> None:
     name, ending = WRITTEN[renderer]
     text = adapter(renderer).export(parse(SCENES[scene]), SETTINGS).files[name]
-    expected = EXPECTED / (scene + ending)
-    if os.environ.get("CROSSRAY_REFRESH") == "1":
-        expected.write_text(text, encoding="utf-8")
-    assert text == expected.read_text(encoding="utf-8")
+    expect_text(scene + ending, text)
 
 
 @pytest.mark.parametrize("name", renderer_names())
@@ -115,12 +110,6 @@ def test_exports_are_pure_and_deterministic(scene: str, tmp_path: Path) -> None:
     assert outputs[0] == outputs[1]
     assert set(json.loads(outputs[0])) == set(renderer_names())
     assert not list(tmp_path.iterdir())
-
-
-def scene_of(*surfaces: Sphere | Plane) -> Scene:
-    spheres = tuple(surface for surface in surfaces if isinstance(surface, Sphere))
-    planes = tuple(surface for surface in surfaces if isinstance(surface, Plane))
-    return Scene((255, 255, 255), 0.1, spheres, planes)
 
 
 def ball(x: float, y: float, z: float, radius: float) -> Sphere:

@@ -4,17 +4,17 @@ The expected files are checked by hand against their scenes. After a change on p
 `CROSSRAY_REFRESH=1 python -m pytest tests/test_translator_mitsuba_stock.py` and read the difference before keeping it.
 """
 
-import importlib.util
-import os
 import re
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
+import helpers
 import pytest
-from helpers import EXAMPLE, TRICKY, exact, pixels_over
+from helpers import EXAMPLE, EXPECTED, NUMBER, TRICKY, exact, expect_text, need_module, pixels_over, rendered
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,19 +22,11 @@ from reference import Plane, Scene, Sphere
 from reference.text import dump, parse
 from translator.contract import PYTHON, Settings, Unsupported
 from translator.renderers.mitsuba_stock import export
-from translator.run import installed_version, run_renderer
 
-EXPECTED = Path(__file__).parent / "expected"
 SETTINGS = Settings(64, 64, 3)
-NUMBER = re.compile(r"(?<![\w.])-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?(?![\w.])")
 XML = ("ambient.xml", "light.xml", "scene.xml")
 pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
-
-
-def scene_of(*surfaces: Sphere | Plane) -> Scene:
-    spheres = tuple(surface for surface in surfaces if isinstance(surface, Sphere))
-    planes = tuple(surface for surface in surfaces if isinstance(surface, Plane))
-    return Scene((255, 128, 0), 0.1, spheres, planes)
+scene_of = partial(helpers.scene_of, ambient=(255, 128, 0))
 
 
 def ball(x: float, y: float, z: float, radius: float, reflection: float = 0, diffuse: float = 1) -> Sphere:
@@ -60,10 +52,7 @@ def files_of(scene: Scene) -> dict[str, str]:
 @pytest.mark.parametrize("name", SCENES)
 def test_export_is_as_expected(name: str, file: str) -> None:
     text = files_of(parse(SCENES[name]))[file]
-    expected = EXPECTED / f"{name}-stock-{file}"
-    if os.environ.get("CROSSRAY_REFRESH") == "1":
-        expected.write_text(text, encoding="utf-8")
-    assert text == expected.read_text(encoding="utf-8")
+    expect_text(f"{name}-stock-{file}", text)
 
 
 @pytest.mark.parametrize("file", XML[:2])
@@ -173,30 +162,18 @@ def test_only_numbers_of_a_scene_reach_the_files(scene: Scene) -> None:
         assert len(set(shapes)) == len(shapes)
 
 
-def need_mitsuba() -> None:
-    if importlib.util.find_spec("mitsuba") is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail("mitsuba is not installed")
-        pytest.skip("mitsuba is not installed")
-
-
 @pytest.mark.parametrize("case", [*SCENES, *KEPT])
 def test_real_pictures_agree(case: str) -> None:
-    need_mitsuba()
+    need_module("mitsuba")
     scene = parse(SCENES[case]) if case in SCENES else KEPT[case]
-    installed_version.cache_clear()
-    outcome = run_renderer("mitsuba-stock", scene, Settings(90, 90, 3, threads=1), 120)
-    assert outcome.status == "rendered", outcome
+    picture, outcome = rendered("mitsuba-stock", scene, Settings(90, 90, 3, threads=1))
     assert outcome.version is not None
     assert outcome.version[0] in "3456789"
-    assert outcome.picture is not None
-    assert outcome.trace_seconds is not None
-    assert outcome.trace_seconds <= (outcome.seconds or 0)
-    assert pixels_over(exact(scene, 90, 90), outcome.picture, 0.5) <= 3
+    assert pixels_over(exact(scene, 90, 90), picture, 0.5) <= 3
 
 
 def test_a_failure_of_the_command_is_the_programs(tmp_path: Path) -> None:
-    need_mitsuba()
+    need_module("mitsuba")
     program = files_of(parse(CARRIED))["draw.py"]
     command = [sys.executable, "-c", program, "missing.xml", "--threads", "1"]
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)

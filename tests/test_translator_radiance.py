@@ -13,7 +13,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import EXAMPLE, ROOT, TRICKY, exact, need_module, pixels_over
+from helpers import (
+    EXAMPLE,
+    NUMBER,
+    ROOT,
+    TRICKY,
+    exact,
+    expect_text,
+    need_module,
+    pixels_over,
+    rendered,
+    scene_of,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -24,22 +35,14 @@ from reference.text import parse
 from translator.contract import Export, Limits, Settings, Unsupported
 from translator.renderers import radiance
 from translator.renderers.radiance import faces, limits
-from translator.run import installed_version, run_renderer, write_export
+from translator.run import run_renderer, write_export
 
-EXPECTED = Path(__file__).parent / "expected"
 SCENES = {"example1": EXAMPLE.read_text(encoding="utf-8"), "tricky": TRICKY}
 FILES = ("scene.rad", "light.rad", "ambient.rad", "scene.vf", "scene.opt")
 SETTINGS = Settings(64, 48, 3)
 LONGEST_COMMENT = 2047  # characters: what follows on the same line, Radiance reads as scene
-NUMBER = re.compile(r"(?<![\w.])-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?(?![\w.])")
 DIAGNOSTIC = ROOT / "scenes" / "diagnostic"
 pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
-
-
-def scene_of(*surfaces: Sphere | Plane) -> Scene:
-    spheres = tuple(surface for surface in surfaces if isinstance(surface, Sphere))
-    planes = tuple(surface for surface in surfaces if isinstance(surface, Plane))
-    return Scene((255, 255, 255), 0.1, spheres, planes)
 
 
 def ball(x: float, y: float, z: float, radius: float) -> Sphere:
@@ -61,10 +64,7 @@ def export(*surfaces: Sphere | Plane, depth: int = 3) -> Export:
 @pytest.mark.parametrize("file", FILES)
 def test_export_is_as_expected(file: str, scene: str) -> None:
     text = radiance.export(parse(SCENES[scene]), SETTINGS).files[file]
-    expected = EXPECTED / f"{scene}-{file}"
-    if os.environ.get("CROSSRAY_REFRESH") == "1":
-        expected.write_text(text, encoding="utf-8")
-    assert text == expected.read_text(encoding="utf-8")
+    expect_text(f"{scene}-{file}", text)
 
 
 def test_export_brings_the_program_that_the_header_runs() -> None:
@@ -408,13 +408,10 @@ def test_no_more_processes_run_than_threads_are_given(
 
 def drawn(scene: Scene, settings: Settings) -> Picture:
     need_module("pyradiance")
-    installed_version.cache_clear()
-    outcome = run_renderer("radiance", scene, settings, 120)
-    assert outcome.status == "rendered", outcome
-    assert outcome.picture is not None
+    picture, outcome = rendered("radiance", scene, settings)
     assert re.fullmatch(r"\S+ of pyradiance [0-9.]+", outcome.version or "")
     assert 0 < (outcome.trace_seconds or 0) < (outcome.seconds or 0)
-    return outcome.picture
+    return picture
 
 
 REAL = {

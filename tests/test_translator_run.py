@@ -3,7 +3,6 @@
 import os
 import shutil
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -11,7 +10,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers import EXAMPLE, TRICKY, exact, need, pixels_over
+from fakes import are_gone
+from helpers import EXAMPLE, TRICKY, exact, need, pixels_over, rendered
 
 import translator.process
 import translator.run
@@ -80,22 +80,6 @@ def draw(fresh_versions: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, 
 
 
 COPY = "shutil.copy(PICTURE, 'scene.exr')\n"
-
-
-def is_running(process: int) -> bool:
-    try:
-        state = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state not in "ZX"
-
-
-def comes_to_an_end(process: int) -> bool:
-    for _ in range(100):
-        if not is_running(process):
-            return True
-        time.sleep(0.02)
-    return False
 
 
 def test_rendered(draw: Draw, levels: Picture) -> None:
@@ -179,13 +163,13 @@ def test_timeout_leaves_no_process(draw: Draw, tmp_path: Path) -> None:
     assert 2 <= outcome.seconds < 8
     processes = (tmp_path / "outside/processes").read_text(encoding="ascii").split()
     assert len(processes) == 2
-    assert all(comes_to_an_end(int(process)) for process in processes)
+    assert are_gone([int(process) for process in processes])
 
 
 def test_a_process_that_is_left_behind_is_ended(draw: Draw, tmp_path: Path) -> None:
     assert draw(FORK + COPY).status == "rendered"
     processes = (tmp_path / "outside/processes").read_text(encoding="ascii").split()
-    assert all(comes_to_an_end(int(process)) for process in processes)
+    assert are_gone([int(process) for process in processes])
 
 
 UNUSABLE = {
@@ -290,14 +274,7 @@ def test_pictures_that_are_not_square_agree(name: str, text: str) -> None:
 def rendered_by(name: str, scene: Scene, width: int, height: int) -> Picture:
     if name == "povray":
         need("povray")
-    installed_version.cache_clear()
-    outcome = run_renderer(name, scene, Settings(width, height), 120)
-    assert outcome.status == "rendered", outcome
-    assert outcome.picture is not None
-    assert outcome.version
-    assert outcome.trace_seconds is not None
-    assert outcome.trace_seconds <= (outcome.seconds or 0)
-    return outcome.picture
+    return rendered(name, scene, Settings(width, height))[0]
 
 
 def test_renderer_without_its_program_is_not_installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ The expected files are checked by hand against their scenes. After a change on p
 `CROSSRAY_REFRESH=1 python -m pytest tests/test_translator_tachyon.py` and read the difference before keeping it.
 """
 
-import os
 import re
 import subprocess
 import sys
@@ -13,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from helpers import EXAMPLE, exact, need, pixels_over
+from helpers import EXAMPLE, EXPECTED, NUMBER, exact, expect_text, need, pixels_over, rendered, scene_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -23,11 +22,8 @@ from reference.text import dump, parse
 from translator.contract import PYTHON, Settings, Unsupported
 from translator.renderers.tachyon import export
 from translator.renderers.tachyon.draw import Colour, Texture, Vector, statements
-from translator.run import installed_version, run_renderer
 
-EXPECTED = Path(__file__).parent / "expected"
 SETTINGS = Settings(64, 48, 3)
-NUMBER = re.compile(r"(?<![\w.])-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?(?![\w.])")
 pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
 
 # Ambient light without green; colours out of range; kr > 1; coefficients that are negative or under 1/512; a twin that
@@ -88,10 +84,7 @@ def shapes_of(scene: Scene) -> list[str]:
 @pytest.mark.parametrize("name", SCENES)
 def test_export_is_as_expected(name: str) -> None:
     text = text_of(parse(SCENES[name]))
-    expected = EXPECTED / f"{name}.dat"
-    if os.environ.get("CROSSRAY_REFRESH") == "1":
-        expected.write_text(text, encoding="utf-8")
-    assert text == expected.read_text(encoding="utf-8")
+    expect_text(f"{name}.dat", text)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -119,12 +112,6 @@ def test_the_drawing_program_reads_what_was_written() -> None:
     assert found["CAMERA"]["FRUSTUM"] == [-0.5078125, 0.4921875, -0.5 - 0.5 / 48, 0.5 - 0.5 / 48]
     assert found["SPHERE"]["CENTER"] == [-30, 20, 300]
     assert found["SPHERE"]["SPECULAR"] == [1.5]
-
-
-def scene_of(*surfaces: Sphere | Plane) -> Scene:
-    spheres = tuple(surface for surface in surfaces if isinstance(surface, Sphere))
-    planes = tuple(surface for surface in surfaces if isinstance(surface, Plane))
-    return Scene((255, 255, 255), 0.1, spheres, planes)
 
 
 def ball(x: float, y: float, z: float, radius: float, reflection: float = 0) -> Sphere:
@@ -271,28 +258,23 @@ def test_only_numbers_of_a_scene_reach_the_file(scene: Scene) -> None:
     assert set(NUMBER.sub("#", text).splitlines()) <= set(NUMBER.sub("#", known).splitlines())
 
 
-def rendered(scene: Scene, width: int, height: int) -> Picture:
+def drawn(scene: Scene, width: int, height: int) -> Picture:
     need("tachyon")
-    installed_version.cache_clear()
-    outcome = run_renderer("tachyon", scene, Settings(width, height), 120)
-    assert outcome.status == "rendered", outcome
+    picture, outcome = rendered("tachyon", scene, Settings(width, height))
     assert outcome.version == "0.99"
-    assert outcome.picture is not None
-    assert outcome.trace_seconds is not None
-    assert outcome.trace_seconds <= (outcome.seconds or 0)
-    return outcome.picture
+    return picture
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_real_pictures_agree(name: str) -> None:
     scene = parse(SCENES[name])
-    assert pixels_over(exact(scene, 160, 90), rendered(scene, 160, 90), 0.05) == 0
+    assert pixels_over(exact(scene, 160, 90), drawn(scene, 160, 90), 0.05) == 0
 
 
 def test_mirrored_rays_pass_through_the_light() -> None:
     """The mirror shows the light exactly in a pixel, and behind it a wall."""
     scene = scene_of(wall(0, 0, 20250, 0, 0, -1, reflection=0.9), wall(0, 0, -700, 0, 0, 1))
-    picture = rendered(scene, 200, 200)
+    picture = drawn(scene, 200, 200)
     assert picture[97, 102] == pytest.approx(exact(scene, 200, 200)[97, 102], abs=0.01)
 
 

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Protocol, cast
@@ -112,6 +112,11 @@ def number(value: float) -> str:
     if not math.isfinite(value):
         raise Unsupported("the scene's numbers are so large that their products overflow")
     return repr(float(value))
+
+
+def spaced(values: Iterable[float]) -> str:
+    """Numbers with spaces between them, each as `number` has it."""
+    return " ".join(map(number, values))
 
 
 def single(value: float) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from importlib import resources
-from typing import Any
 
 from reference.scene import (
     EYE,
@@ -17,7 +16,7 @@ from reference.scene import (
     distinct_planes,
     distinct_spheres,
 )
-from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single, source
+from translator.contract import PYTHON, Export, Limits, Settings, Unsupported, number, single, source, spaced
 from translator.likeness import find_alike
 
 TITLE = "Mitsuba 3"
@@ -116,8 +115,8 @@ def export(scene: Scene, settings: Settings) -> Export:
         distance=SCREEN_DISTANCE,
         width=settings.width,
         height=settings.height,
-        light=_spaced(LIGHT),
-        intensity=_spaced([math.pi] * 3),
+        light=spaced(LIGHT),
+        intensity=spaced([math.pi] * 3),
     )
     light = [value * scene.ambient_coefficient / 256 for value in scene.ambient]
     shapes = [_surface(name, "sphere", _ball(sphere), sphere, light) for name, sphere in spheres.items()]
@@ -177,7 +176,7 @@ def _surface(name: str, shape: str, geometry: str, surface: Sphere | Plane, ligh
 
 
 def _ball(sphere: Sphere) -> str:
-    centre = f'<point name="center" value="{_spaced(sphere.centre)}"/>'
+    centre = f'<point name="center" value="{spaced(sphere.centre)}"/>'
     return f'{centre}\n    <float name="radius" value="{number(sphere.radius)}"/>'
 
 
@@ -187,14 +186,10 @@ def _frame(plane: Plane) -> str:
     centre = [value * offset + 0.0 for value in normal]  # nearest the eye; never -0.0
     widened = ([PLANE_RADIUS * value for value in axis] for axis in plane.tangents)
     rows = [list(row) for row in zip(*widened, normal, centre, strict=True)]
-    matrix = "  ".join(_spaced(row) for row in [*rows, [0.0, 0.0, 0.0, 1.0]])
+    matrix = "  ".join(spaced(row) for row in [*rows, [0.0, 0.0, 0.0, 1.0]])
     return f'<transform name="to_world"><matrix value="{matrix}"/></transform>'
 
 
 def _constant(name: str, values: list[float]) -> str:
     value = " ".join(map(single, values))
     return f'<texture type="rawconstant" name="{name}"><vector name="value" value="{value}"/></texture>'
-
-
-def _spaced(values: Any) -> str:
-    return " ".join(map(number, values))

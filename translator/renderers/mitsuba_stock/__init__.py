@@ -13,8 +13,8 @@ import math
 from importlib import resources
 
 from reference.scene import EYE, LIGHT, SCREEN, SCREEN_DISTANCE, Plane, Scene, Sphere, distinct_planes, distinct_spheres
-from translator.contract import PYTHON, Export, Settings, source
-from translator.renderers.mitsuba_stock.elements import moved, spaced
+from translator.contract import PYTHON, Export, Settings, source, spaced
+from translator.renderers.mitsuba_stock.elements import moved
 from translator.renderers.mitsuba_stock.falloff import VALLEY
 from translator.renderers.mitsuba_stock.limits import LIMITS, refuse
 from translator.renderers.mitsuba_stock.surfaces import DIMMED, glowing_shape, lit_shape

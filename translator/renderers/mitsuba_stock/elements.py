@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 from reference.scene import Triple
-from translator.contract import number, single
+from translator.contract import single, spaced
 from translator.renderers.mitsuba_stock.limits import ORIGIN
 
 
@@ -26,8 +25,3 @@ def constant(name: str, values: list[float]) -> str:
     """A colour kept as it is written, of any sign and size. Raises Unsupported beyond single precision."""
     value = " ".join(map(single, values))
     return f'<texture type="rawconstant" name="{name}"><vector name="value" value="{value}"/></texture>'
-
-
-def spaced(values: Iterable[float]) -> str:
-    """Numbers with all their digits, as XML attributes list them. Raises Unsupported for overflow."""
-    return " ".join(map(number, values))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-from reference.scene import LIGHT, SCREEN, SCREEN_DISTANCE, Plane, Sphere
+from reference.scene import LIGHT, SCREEN, SCREEN_CORNERS, SCREEN_DISTANCE, Plane, Sphere
 from translator.contract import Limits, Settings, Unsupported
 
 ORIGIN = (0.0, -100.0, 250.0)  # what becomes (0, 0, 0): rays start ahead in proportion to their coordinates there
 PLANE_RADIUS = 1e9  # a plane is a disk of this radius
-CORNERS = [(x, y, SCREEN_DISTANCE) for x in (-SCREEN, SCREEN) for y in (-SCREEN, SCREEN)]
 
 RAY_EPSILON = 1500 * 2.0**-24  # rays start ahead of a point by this times 1 + its largest coordinate, along the normal
 SHADOW_EPSILON = 10 * RAY_EPSILON  # shadow rays end before the light by this share of the way
@@ -44,7 +43,7 @@ def refuse(spheres: dict[str, Sphere], planes: dict[str, Plane], settings: Setti
         _refuse_sides(name, sphere, *_distances_from_screen(sphere))
         _refuse_light_gap(name, math.dist(sphere.centre, LIGHT) - sphere.radius)
     for name, plane in planes.items():
-        sides = [-plane.distance_from(corner) for corner in CORNERS]
+        sides = [-plane.distance_from(corner) for corner in SCREEN_CORNERS]
         _refuse_sides(name, plane, min(sides), max(sides))
         if gap := plane.distance_from(LIGHT):
             _refuse_light_gap(name, gap)
@@ -60,8 +59,8 @@ def is_lit(surface: Sphere | Plane) -> bool:
 def is_seen_from_back(surface: Sphere | Plane) -> bool:
     """Whether the screen, where all rays start, is on the side that the normal points away from."""
     if isinstance(surface, Sphere):
-        return math.dist(surface.centre, CORNERS[0]) < surface.radius
-    return surface.distance_from(CORNERS[0]) > 0
+        return math.dist(surface.centre, SCREEN_CORNERS[0]) < surface.radius
+    return surface.distance_from(SCREEN_CORNERS[0]) > 0
 
 
 def _refuse_light_gap(name: str, gap: float) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from reference.scene import Plane, Sphere
-from translator.contract import number
-from translator.renderers.mitsuba_stock.elements import constant, matrix, moved, spaced
+from translator.contract import number, spaced
+from translator.renderers.mitsuba_stock.elements import constant, matrix, moved
 from translator.renderers.mitsuba_stock.falloff import undo_falloff
 from translator.renderers.mitsuba_stock.limits import ORIGIN, PLANE_RADIUS, is_lit, is_seen_from_back
 

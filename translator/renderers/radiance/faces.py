@@ -10,14 +10,13 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from reference.scene import EYE, SCREEN, SCREEN_DISTANCE, Plane, Sphere, Triple
+from reference.scene import EYE, SCREEN, SCREEN_CORNERS, SCREEN_DISTANCE, Plane, Sphere, Triple
 from translator.contract import number
 from translator.renderers.radiance.limits import HUGE, TINY
 
 PLANE_RADIUS = HUGE  # of the disk that a plane is, in Radiance's units
 THICKNESS = TINY  # of a plane that is seen from both sides, in Radiance's units
 LARGE = 1e5  # radius from which on rounding can put the start of a ray inside a sphere that it leaves
-CORNERS = [(x, y, SCREEN_DISTANCE) for x in (-SCREEN, SCREEN) for y in (-SCREEN, SCREEN)]
 
 SHAPE = """
 {material} {kind} {name}
@@ -54,7 +53,7 @@ def faces_of(name: str, surface: Sphere | Plane) -> Iterator[Face]:
 def _sides_of_sphere(name: str, sphere: Sphere) -> Iterator[Face]:
     x, y, _ = (min(SCREEN, max(-SCREEN, value)) for value in sphere.centre)
     is_inside = math.dist((x, y, SCREEN_DISTANCE), sphere.centre) < sphere.radius
-    is_outside = max(math.dist(corner, sphere.centre) for corner in CORNERS) > sphere.radius
+    is_outside = max(math.dist(corner, sphere.centre) for corner in SCREEN_CORNERS) > sphere.radius
     if is_outside and sphere.radius <= LARGE:
         yield Face(name, sphere, True, is_double=True)
         return
@@ -65,7 +64,7 @@ def _sides_of_sphere(name: str, sphere: Sphere) -> Iterator[Face]:
 
 
 def _sides_of_plane(name: str, plane: Plane) -> Iterator[Face]:
-    distances = [plane.distance_from(corner) for corner in CORNERS]
+    distances = [plane.distance_from(corner) for corner in SCREEN_CORNERS]
     if not any(distances):  # the screen itself, which rays leave along z
         yield Face(name, plane, is_given=plane.normal[2] > 0)
         return

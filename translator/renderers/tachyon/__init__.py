@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import resources
 
 from reference.scene import EYE, LIGHT, Plane, Scene, Sphere, Triple, distinct_planes, distinct_spheres
-from translator.contract import PYTHON, Export, Settings, number, single, source
+from translator.contract import PYTHON, Export, Settings, number, single, source, spaced
 from translator.renderers.tachyon.limits import ENDLESS, FAINTEST, LIMITS, UNIT, refuse
 from translator.renderers.tachyon.places import holds, is_lit, only_between, reach, slants
 
@@ -121,9 +121,9 @@ def _header(scene: Scene, settings: Settings, command: str, paint: _Paint) -> st
         height=settings.height,
         depth=settings.depth,
         levels=settings.depth + 1,
-        eye=_spaced(EYE),
-        frustum=_spaced(frustum),
-        light=_spaced(LIGHT),
+        eye=spaced(EYE),
+        frustum=spaced(frustum),
+        light=spaced(LIGHT),
         dimmed=number(DIMMED),
         light_colour=" ".join(single(DIMMED / value) for value in paint.tint),
     )
@@ -131,7 +131,7 @@ def _header(scene: Scene, settings: Settings, command: str, paint: _Paint) -> st
 
 def _sphere(name: str, sphere: Sphere, paint: _Paint) -> str:
     diffuse = 0.0 if holds(sphere, LIGHT) else sphere.diffuse
-    shape = f"SPHERE CENTER {_spaced(sphere.centre)} RAD {number(sphere.radius)}"
+    shape = f"SPHERE CENTER {spaced(sphere.centre)} RAD {number(sphere.radius)}"
     return f"# {name}\n{shape}\n  {paint.texture(sphere, diffuse)}\n"
 
 
@@ -141,7 +141,7 @@ def _plane(name: str, plane: Plane, paint: _Paint, behind: bool, end: float) -> 
     opacity = 1 if plane.distance_from(LIGHT) else SHADOWLESS
     normal = plane.unit_normal
     foot = [value * plane.distance_from(EYE) + 0.0 for value in normal]  # never -0.0
-    place = f"CENTER {_spaced(foot)} NORMAL {_spaced(normal)}"
+    place = f"CENTER {spaced(foot)} NORMAL {spaced(normal)}"
     if behind:
         shape = _triangle(plane, foot, end)
     else:
@@ -160,9 +160,5 @@ def _triangle(plane: Plane, foot: Iterable[float], radius: float) -> str:
         [f + radius * (a * u + b * v) for f, u, v in zip(foot, across, along, strict=True)]
         for a, b in ((-2, -1), (0, 2), (2, -1))
     ]
-    places = " ".join(f"V{index} {_spaced(corner)}" for index, corner in enumerate(corners))
-    return f"STRI {places} " + " ".join(f"N{index} {_spaced(normal)}" for index in range(3))
-
-
-def _spaced(values: Iterable[float]) -> str:
-    return " ".join(map(number, values))
+    places = " ".join(f"V{index} {spaced(corner)}" for index, corner in enumerate(corners))
+    return f"STRI {places} " + " ".join(f"N{index} {spaced(normal)}" for index in range(3))

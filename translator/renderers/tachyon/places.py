@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from itertools import combinations
 
-from reference.scene import EYE, LIGHT, SCREEN, SCREEN_DISTANCE, Plane, Sphere, Triple, exact
+from reference.scene import EYE, LIGHT, SCREEN, SCREEN_CORNERS, SCREEN_DISTANCE, Plane, Sphere, Triple, exact
 
 
 def holds(sphere: Sphere, point: Triple) -> bool:
@@ -59,8 +59,7 @@ def is_sphere_before_screen(sphere: Sphere) -> bool:
     sides: tuple[tuple[float, ...], ...] = ((), (x,), (y,), (x, y))
     bottoms = [(z + slope * sum(active)) / (1 + slope * slope * len(active)) for active in sides]
     nearest = min(distance(min(max(depth, 0), SCREEN_DISTANCE)) for depth in bottoms)
-    corners = [(a, b, SCREEN_DISTANCE) for a in (-SCREEN, SCREEN) for b in (-SCREEN, SCREEN)]
-    return nearest < sphere.radius and not all(holds(sphere, point) for point in (EYE, *corners))
+    return nearest < sphere.radius and not all(holds(sphere, point) for point in (EYE, *SCREEN_CORNERS))
 
 
 def is_plane_before_screen(plane: Plane) -> bool:
