@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
@@ -33,7 +34,9 @@ ENVIRONMENT = {"RAYPATH": str(BINPATH.parent / "lib")}  # where Radiance's libra
 def run(program: str, *options: str, given: bytes | memoryview = b"") -> bytes:
     """What one of Radiance's programs writes. Ends with its exit code if it fails; it has said why, unless stopped."""
     command = [BINPATH / program, *options]
-    finished = subprocess.run(command, input=given, stdout=subprocess.PIPE, env=ENVIRONMENT, check=False)
+    finished = subprocess.run(command, input=given, capture_output=True, env=ENVIRONMENT, check=False)
+    sys.stderr.write(finished.stderr.decode("utf-8", "replace"))  # in one piece, as others may say something, too
+    sys.stderr.flush()
     if finished.returncode < 0:
         raise SystemExit(f"{program} was stopped by signal {-finished.returncode}")
     if finished.returncode > 0:
