@@ -6,7 +6,7 @@ values, one kernel for each pair of counts; beyond that it loops over the surfac
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import chain
 from typing import Any
 
@@ -44,21 +44,36 @@ def render(
     `depth` counts the bounces after the primary hit; `precision` is that of the computation (double or single).
     Raises InputError for a size or depth out of range and DeviceError where Dr.Jit cannot compute.
     """
+    picture = np.empty((height, width, 3), dtype)
+    top = 0
+    for band in render_bands(scene, model, width=width, height=height, depth=depth, precision=precision, device=device):
+        picture[top : top + len(band)] = band
+        top += len(band)
+    return picture
+
+
+def render_bands(
+    scene: Scene,
+    model: Model = DOCUMENT,
+    *,
+    width: int = 1000,
+    height: int = 1000,
+    depth: int = 3,
+    precision: str = "double",
+    device: str = "auto",
+) -> Iterator[NDArray[Any]]:
+    """The picture of `render` from top to bottom, some rows at a time (rows x width x 3), for what memory cannot hold."""
     check_request(width, height, depth)
     types = array_types(precision, device)
     _check_magnitudes(scene, precision)
     world = World(scene, model, types)
     limit = dr.opaque(world.Index, depth)
-    picture = np.empty((height, width, 3), dtype)
     rows = max(1, BAND // width)
     for top in range(0, height, rows):
-        band = picture[top : top + rows]
-        direction = world.Vector(*model.camera_direction(*pixel_places(world, width, height, top, len(band))))
+        count = min(rows, height - top)
+        direction = world.Vector(*model.camera_direction(*pixel_places(world, width, height, top, count)))
         colour = dr.ravel(_radiance(world, direction, limit)).numpy()
-        band[:] = np.broadcast_to(colour.reshape(-1, 3), (len(band) * width, 3)).reshape(
-            band.shape
-        )  # constant if empty
-    return picture
+        yield np.broadcast_to(colour.reshape(-1, 3), (count * width, 3)).reshape(count, width, 3)  # constant if empty
 
 
 def check_request(width: int, height: int, depth: int) -> None:
