@@ -62,7 +62,7 @@ def render_bands(
     precision: str = "double",
     device: str = "auto",
 ) -> Iterator[NDArray[Any]]:
-    """The picture of `render` from top to bottom, some rows at a time (rows x width x 3), for what memory cannot hold."""
+    """The picture of `render` from top to bottom, some rows at a time: rows x width x 3."""
     check_request(width, height, depth)
     types = array_types(precision, device)
     _check_magnitudes(scene, precision)
