@@ -11,7 +11,7 @@ from typing import Any
 
 from reference.errors import DeviceError, InputError
 
-PRECISIONS = ("double", "single")
+PRECISIONS = ("auto", "double", "single")
 DEVICES = ("auto", "cpu", "gpu")
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 LLVM_PACKAGE = "karellen-llvm-core"
@@ -27,7 +27,7 @@ assert dr.sum(x)[0] > 300
 
 @dataclass(frozen=True)
 class Types:
-    """The Dr.Jit array types of one backend at one precision."""
+    """The Dr.Jit array types of one backend at one precision; `Double` whatever the precision."""
 
     device: str
     Float: Any
@@ -35,10 +35,13 @@ class Types:
     Mask: Any
     Vector3: Any
     Vector4: Any
+    Double: Any
 
 
 def array_types(precision: str = "double", device: str = "auto") -> Types:
-    """The types to compute with. `auto` takes a CUDA graphics card where there is one, else the processor.
+    """The types to compute with: those of double precision where that is `auto`.
+
+    The device `auto` is a CUDA graphics card where there is one, else the processor.
 
     Raises InputError for an unknown name and DeviceError where the device cannot compute.
     """
@@ -53,9 +56,10 @@ def array_types(precision: str = "double", device: str = "auto") -> Types:
     if not drjit.has_backend(backend):
         raise DeviceError(_missing(device))
     module = importlib.import_module("drjit.cuda" if device == "gpu" else "drjit.llvm")
-    if precision == "double":
-        return Types(device, module.Float64, module.UInt32, module.Bool, module.Array3f64, module.Array4f64)
-    return Types(device, module.Float32, module.UInt32, module.Bool, module.Array3f, module.Array4f)
+    double = module.Float64
+    if precision != "single":
+        return Types(device, double, module.UInt32, module.Bool, module.Array3f64, module.Array4f64, double)
+    return Types(device, module.Float32, module.UInt32, module.Bool, module.Array3f, module.Array4f, double)
 
 
 def provide_llvm() -> None:

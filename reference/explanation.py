@@ -20,7 +20,7 @@ from reference.image import quantise
 from reference.model import DOCUMENT, EXACT, Model, Window
 from reference.proof import Prover
 from reference.rules import DOCUMENT_RULES, EXACT_RULES, Rules
-from reference.scene import EYE, LIGHT, Plane, Scene, Sphere, Triple, holds_light
+from reference.scene import EYE, LIGHT, SCREEN, Plane, Scene, Sphere, Triple, holds_light
 from reference.walk import Ray
 
 Surface = Sphere | Plane
@@ -112,7 +112,7 @@ def explain(
     proof = None
     if (rules := _rules(model)) and len(tracer.surfaces) <= LARGEST_PROOF:
         proof = Prover(scene, width=width, height=height, depth=depth).admissible(column, row, rules)
-    camera = Vector(*model.camera_direction(float(column), float(row), float(width), float(height)))
+    camera = Vector(*model.camera_direction(float(column), float(row), 2 * SCREEN / width, 2 * SCREEN / height))
     bounces = tuple(tracer.follow(Vector(*EYE), camera, depth, proof.rays if proof else ()))
     shares = [bounce.contribution or (0.0, 0.0, 0.0) for bounce in bounces]
     red, green, blue = (sum(channel) for channel in zip(*shares, strict=True))

@@ -53,22 +53,21 @@ class Model:
     reflected_weight: Callable[[Number, Number, Number], Number]
 
 
-def pixel_direction(column: Number, row: Number, width: Number, height: Number) -> tuple[Number, Number, Number]:
-    """From the eye to the centre of a pixel (row 0 on top): t = 1 lies on the screen."""
-    x = (column + 0.5) * (2 * SCREEN / width) - SCREEN
-    y = SCREEN - (row + 0.5) * (2 * SCREEN / height)
-    return x, y, SCREEN_DISTANCE
+def pixel_direction(column: Number, row: Number, across: Number, down: Number) -> tuple[Number, Number, Number]:
+    """From the eye to the centre of a pixel (row 0 on top) of a size: t = 1 lies on the screen."""
+    return (column + 0.5) * across - SCREEN, SCREEN - (row + 0.5) * down, SCREEN_DISTANCE
 
 
 def sphere_distances(p: Vector, d: Vector, dd: Number, radius: Number, leaving: Mask) -> tuple[Number, Number]:
     """Roots of d.d t^2 + 2 p.d t + p.p - r^2, p = origin - centre; NaN for a miss.
 
+    A quarter of the discriminant is d.d (r^2 - l.l), l the way from the centre to the ray, which loses fewer digits.
     A ray that starts on the sphere has p.p = r^2, so that its roots are exactly 0 and -2 p.d / d.d.
     """
-    half = dr.dot(p, d)
-    constant = dr.select(leaving, 0, dr.fma(-radius, radius, dr.dot(p, p)))
-    root = dr.sqrt(dr.fma(half, half, -dd * constant))
-    scale = dr.rcp(dd)
+    half, scale = dr.dot(p, d), dr.rcp(dd)
+    way = dr.fma(d, -half * scale, p)
+    depth = dr.fma(radius, radius, -dr.dot(way, way))
+    root = dr.sqrt(dr.select(leaving, half * half, dd * depth))
     return (-half - root) * scale, (root - half) * scale
 
 
@@ -84,7 +83,8 @@ def sphere_normal(point: Vector, centre: Vector, radius: Number) -> Vector:
 
 def cosine(normal: Vector, to_light: Vector) -> Number:
     """max(0, n.l) with l at unit length."""
-    return dr.maximum(dr.dot(normal, to_light) * dr.rsqrt(dr.dot(to_light, to_light)), 0)
+    along = dr.dot(normal, to_light) * dr.rcp(dr.norm(to_light))
+    return dr.select(along > 0, along, 0)
 
 
 def ambient(surface: Vector, colour: Vector, coefficient: Number) -> Vector:
@@ -99,7 +99,12 @@ def diffuse(surface: Vector, coefficient: Number, cosine: Number) -> Vector:
 
 def reflected_direction(d: Vector, normal: Vector) -> Vector:
     """The mirrored direction d - 2 (d.n) n, at unit length."""
-    return dr.normalize(dr.fma(normal, -2 * dr.dot(d, normal), d))
+    return dr.normalize(mirrored(d, normal))
+
+
+def mirrored(d: Vector, normal: Vector) -> Vector:
+    """d - 2 (d.n) n, as long as d."""
+    return dr.fma(normal, -2 * dr.dot(d, normal), d)
 
 
 def reflected_weight(weight: Number, coefficient: Number, depth: Number) -> Number:

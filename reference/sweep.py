@@ -17,7 +17,7 @@ from reference.balls import UNIT, Arrow, Ball, Mask, Number
 from reference.device import Types, array_types
 from reference.enclosure import HeldPlane, HeldSphere, Tables, precision
 from reference.scene import EYE, LIGHT, SCREEN, SCREEN_DISTANCE, Plane, Scene, Sphere, Triple, merge_coincident
-from reference.tracer import BAND, NOTHING, Rows, State, materials, pixel_places
+from reference.tables import BAND, MATERIAL, NOTHING, Rows, State, materials, pixel_places
 
 SMALLEST, LARGEST = 1e-30, 1e30  # of the scene's numbers, so that no product under- or overflows
 STRAIGHT = 2.0**-20  # the largest relative error of a direction, beyond which a ray gives up
@@ -71,10 +71,11 @@ class BallWorld(Rows):
             tables = Tables(scene)
             geometry = [_sphere_row(s) if isinstance(s, HeldSphere) else _plane_row(s) for s in tables.surfaces]
             ambient = [_nearest(value)[0] for value in tables.ambient]
-        super().__init__(types, len(scene.spheres), geometry, materials(scene), WIDTH)
+        super().__init__(types, len(scene.spheres), geometry, WIDTH)
+        self.materials = Rows(types, len(scene.spheres), materials(scene), MATERIAL)
         self.fading = all(abs(mirror) <= 1 for _, _, _, _, mirror, *_ in materials(scene))
-        self.ambient = self.Vector(*map(self._uniform, ambient))
-        self.brightest = self._uniform(max(map(abs, ambient)))
+        self.ambient = self.Vector(*map(self.uniform, ambient))
+        self.brightest = self.uniform(max(map(abs, ambient)))
         self.eye, self.light = self.held(EYE), self.held(LIGHT)
 
     def held(self, point: Triple | list[Number], radius: Number = 0) -> Arrow:
@@ -116,7 +117,9 @@ class _Ray:
 
 def _camera(world: BallWorld, width: int, height: int, top: int, count: int) -> tuple[Arrow, Ball]:
     """Directions to the centres of pixels, two coordinates rounded once, and the squares of their lengths."""
-    column, row, across, down = pixel_places(world, width, height, top, count)
+    pixel = dr.arange(world.Index, count * width)
+    column, row = pixel_places(world, width, top, pixel)
+    across, down = world.uniform(width), world.uniform(height)
     x = (2 * column + 1 - across) * SCREEN / across
     y = (down - 1 - 2 * row) * SCREEN / down
     square = dr.fma(x, x, dr.fma(y, y, SCREEN_DISTANCE**2))
@@ -134,7 +137,7 @@ def _radiance(world: BallWorld, d: Arrow, dd: Ball, limit: Number) -> tuple[Numb
     t, t_radius, hit, lost = nearest(world, _Ray(world.eye, d, dd, world.Index(NOTHING)), True, world.Mask(True))
     while hit != NOTHING:
         row = world.row(hit)
-        red, green, blue, diffuse, mirror, _, _, _ = world.material(hit)
+        red, green, blue, diffuse, mirror, _, _, _ = world.materials.row(hit)
         onto = Arrow(direction, direction_radius, d.length)
         point = Arrow(origin, origin_radius, world.Float(0)).along(Ball(t, t_radius), onto)
         normal = _normal(world, hit, row, point)

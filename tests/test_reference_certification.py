@@ -19,7 +19,7 @@ from flint import arb, ctx, fmpq
 from helpers import EXAMPLE, ROOT, crossray
 from random_scenes import random_scene
 
-from reference import balls, certification, sweep, tracer
+from reference import balls, certification, sweep, tables
 from reference.balls import Arrow, Ball
 from reference.certification import CERTAIN, KNIFE_EDGE, UNDECIDED, certify
 from reference.device import array_types
@@ -57,7 +57,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::reference.errors.SceneWarning")
 @pytest.fixture
 def looped(monkeypatch: pytest.MonkeyPatch) -> None:
     """One kernel for scenes of any size."""
-    monkeypatch.setattr(tracer, "UNROLLED", 0)
+    monkeypatch.setattr(tables, "UNROLLED", 0)
 
 
 @cache
@@ -157,7 +157,7 @@ def off_by(number: float, true: Fraction | arb) -> float:
 
 
 def geometry(scene: Scene) -> list[list[float]]:
-    rows: list[list[float]] = sweep.BallWorld(scene, array_types()).geometry.numpy().reshape(-1, sweep.WIDTH).tolist()
+    rows: list[list[float]] = sweep.BallWorld(scene, array_types()).numbers.numpy().reshape(-1, sweep.WIDTH).tolist()
     return rows
 
 
@@ -221,7 +221,7 @@ def test_weights_that_underflow_on_the_way() -> None:
 def test_the_loop_certifies_what_straight_code_does(monkeypatch: pytest.MonkeyPatch) -> None:
     results = []
     for unrolled, band in ((1000, 1 << 22), (0, 1 << 22), (0, 500)):
-        monkeypatch.setattr(tracer, "UNROLLED", unrolled)
+        monkeypatch.setattr(tables, "UNROLLED", unrolled)
         monkeypatch.setattr(sweep, "BAND", band)
         results.append(sweep.sweep(EXAMPLES[2], width=70, height=50, depth=3))
     (picture, radius), (other, other_radius), (banded, banded_radius) = results

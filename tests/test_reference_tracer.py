@@ -13,7 +13,7 @@ import pytest
 import transcription
 
 import reference
-from reference import device, tracer
+from reference import device, tables, tracer
 from reference.errors import DeviceError, InputError
 from reference.explanation import explain
 from reference.image import quantise, read_image
@@ -95,9 +95,9 @@ def test_document_and_exact_agree_on_the_examples(path: Path) -> None:
 @pytest.mark.parametrize("path", EXAMPLES + DIAGNOSTIC, ids=names)
 def test_the_loop_draws_what_straight_code_draws(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = Scene.load(path)
-    monkeypatch.setattr(tracer, "UNROLLED", 1000)
+    monkeypatch.setattr(tables, "UNROLLED", 1000)
     straight = render(scene, width=120, height=120, dtype=float)
-    monkeypatch.setattr(tracer, "UNROLLED", 0)
+    monkeypatch.setattr(tables, "UNROLLED", 0)
     assert worst(render(scene, width=120, height=120, dtype=float), straight) < 1e-9
 
 
@@ -124,8 +124,8 @@ def test_other_numbers_need_no_other_kernel() -> None:
 
 def test_large_scenes_share_one_kernel_whatever_their_counts() -> None:
     planes = replace(random_scene(40, seed=3), planes=(FLOOR,) * 7)
-    alone = kernels(random_scene(tracer.UNROLLED, seed=1))
-    assert kernels(random_scene(tracer.UNROLLED, seed=1), random_scene(60, seed=2), planes) == alone
+    alone = kernels(random_scene(tables.UNROLLED, seed=1))
+    assert kernels(random_scene(tables.UNROLLED, seed=1), random_scene(60, seed=2), planes) == alone
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])
