@@ -9,10 +9,12 @@ import re
 import signal
 import sys
 import warnings
+from collections import deque
+from collections.abc import Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice, pairwise
+from itertools import chain, islice, pairwise
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -25,6 +27,8 @@ from reference.errors import CrossrayError, FailureError, InputError, SceneWarni
 from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from translator.contract import Settings
     from translator.run import Outcome
 
@@ -146,27 +150,44 @@ def render(
     crossray render scenes/example1.txt
     crossray render scenes/example1.txt -o picture.exr --size 500x500 --convention exact
     """
-    from reference.image import check_format, show_window, write_image
+    from reference.image import check_format, show_window, write_bands
 
     check_format(output)
     loaded = _load(scene, quiet)
     import reference
 
     model = reference.CONVENTIONS[convention]
-    arithmetic = {"precision": precision, "device": device}
-    trace = partial(reference.render, loaded, model, width=size.width, height=size.height, depth=depth, **arithmetic)
-    levels = trace(dtype=float)
-    write_image(output, levels)
+    from reference.tracer import render_bands
+
+    asked = {"width": size.width, "height": size.height, "depth": depth, "precision": precision, "device": device}
+    trace = partial(render_bands, loaded, model, **asked)
+    with closing(_watched(trace(), size, quiet)) as bands:
+        write_bands(output, size.width, size.height, bands)
     _say(f"{output}: {size}, {convention}, {precision} precision", quiet or not verbose)
     if time:
         runs = [perf_counter()]
         for _ in range(TIMED_RUNS):
-            trace(dtype=float)
+            deque(trace(), maxlen=0)
             runs.append(perf_counter())
         seconds = median(after - before for before, after in pairwise(runs))
         print(f"traced in {seconds:.4f} s, the median of {TIMED_RUNS} without start-up and files", file=sys.stderr)
     if show:
-        show_window(levels)
+        show_window(reference.render(loaded, model, **asked, dtype=float))
+
+
+def _watched(bands: Iterator[NDArray[Any]], size: Size, quiet: bool) -> Iterator[NDArray[Any]]:
+    """The bands of a picture, the rows that are done on the terminal while there are more to come."""
+    band = next(bands)
+    if len(band) == size.height or quiet or not sys.stderr.isatty():
+        yield band
+        yield from bands
+        return
+    from reports.terminal import progress_lines
+
+    with progress_lines(quiet, False, {"render": size.height}) as show:
+        for band in chain([band], bands):
+            yield band
+            show("render", f"{size}", len(band))
 
 
 @app.command(cls=NamesCommand)
