@@ -10,7 +10,7 @@ import signal
 import sys
 import warnings
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -159,7 +159,8 @@ def render(
     model = reference.CONVENTIONS[convention]
     from reference.tracer import render_bands
 
-    asked = {"width": size.width, "height": size.height, "depth": depth, "precision": precision, "device": device}
+    asked: dict[str, Any] = {"width": size.width, "height": size.height, "depth": depth}
+    asked |= {"precision": precision, "device": device}
     trace = partial(render_bands, loaded, model, **asked)
     with closing(_watched(trace(), size, quiet)) as bands:
         write_bands(output, size.width, size.height, bands)
@@ -175,19 +176,19 @@ def render(
         show_window(reference.render(loaded, model, **asked, dtype=float))
 
 
-def _watched(bands: Iterator[NDArray[Any]], size: Size, quiet: bool) -> Iterator[NDArray[Any]]:
+def _watched(bands: Iterator[NDArray[Any]], size: Size, quiet: bool) -> Generator[NDArray[Any]]:
     """The bands of a picture, the rows that are done on the terminal while there are more to come."""
-    band = next(bands)
-    if len(band) == size.height or quiet or not sys.stderr.isatty():
-        yield band
+    first = next(bands)
+    if len(first) == size.height or quiet or not sys.stderr.isatty():
+        yield first
         yield from bands
         return
     from reports.terminal import progress_lines
 
-    with progress_lines(quiet, False, {"render": size.height}) as show:
-        for band in chain([band], bands):
+    with progress_lines(quiet, False, {"rows": size.height}) as show:
+        for band in chain([first], bands):
             yield band
-            show("render", f"{size}", len(band))
+            show("rows", "", len(band))
 
 
 @app.command(cls=NamesCommand)

@@ -21,7 +21,8 @@ from reference.files import replacing
 JPEG = (".jpg", ".jpeg")
 LARGEST_JPEG = 65500  # pixels a side
 FORMATS = (*JPEG, ".png", ".exr")
-PNG_FILTER = 16  # "sub" only, PNG_FILTER_SUB of libpng: four times as fast as trying all
+PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
+PNG_FILTER = 16  # libpng's PNG_FILTER_SUB, the difference from the pixel on the left, for every row
 BAND = 1 << 22  # pixels that are encoded at a time
 CACHED = 16  # rows that are quantised at a time
 
@@ -30,10 +31,11 @@ Picture = NDArray[np.floating[Any]]
 
 def quantise(levels: Picture) -> NDArray[np.uint8]:
     """Clamp once to 0..255 and truncate, as the document does; what is not a number becomes 0."""
-    pixels = np.empty(levels.shape, np.uint8)
+    pixels, room = np.empty(levels.shape, np.uint8), np.empty_like(levels[:CACHED])
     for top in range(0, len(levels), CACHED):
-        rows = slice(top, top + CACHED)
-        pixels[rows] = np.fmin(np.fmax(levels[rows], 0), 255)
+        rows = levels[top : top + CACHED]
+        clamped = np.fmax(rows, 0, out=room[: len(rows)])
+        pixels[top : top + CACHED] = np.fmin(clamped, 255, out=clamped)
     return pixels
 
 
@@ -92,14 +94,16 @@ def _encode_jpeg(width: int, height: int, bands: Iterable[Picture]) -> memoryvie
 
 
 def _write_rows(path: Path, width: int, height: int, bands: Iterable[Picture]) -> None:
-    """Write band after band and read the end back, since encoders can miss a full disk."""
+    """Write band after band and look whether the end has come out, since encoders can miss a full disk."""
     import OpenImageIO as oiio
 
     exact = path.suffix.lower() == ".exr"
     spec = oiio.ImageSpec(width, height, 3, oiio.FLOAT if exact else oiio.UINT8)
-    spec.attribute("compression", "zip:1" if exact else "zip")
-    spec.attribute("png:compressionLevel", 1)
-    spec.attribute("png:filter", PNG_FILTER)
+    if exact:
+        spec.attribute("compression", "zip:1")  # a fifth to a third faster than the usual 4, and 5 % larger
+    else:
+        spec.attribute("png:compressionLevel", 1)  # with its filter, four times as fast as usual and twice as large
+        spec.attribute("png:filter", PNG_FILTER)
     output: Any = oiio.ImageOutput.create(str(path))
     done, top = output.open(str(path), spec), 0
     try:
@@ -110,13 +114,17 @@ def _write_rows(path: Path, width: int, height: int, bands: Iterable[Picture]) -
             top += len(band)
     finally:
         closed = output.close()
-    if not (closed and done and _reads_back(path)):
+    if not (closed and done and _is_whole(path)):
         reason = output.geterror() if os.statvfs(path.parent).f_bavail else os.strerror(errno.ENOSPC)
         raise OSError(reason.replace(str(path), "").strip() or "the file came out incomplete")
 
 
-def _reads_back(path: Path) -> bool:
-    """Whether the last row is there; everything was written before it."""
+def _is_whole(path: Path) -> bool:
+    """Whether the end is there, which is written last: the final chunk of a PNG, the last row of an EXR."""
+    if path.suffix.lower() == ".png":
+        with path.open("rb") as file:
+            file.seek(max(0, path.stat().st_size - len(PNG_END)))
+            return file.read() == PNG_END
     import OpenImageIO as oiio
 
     source = oiio.ImageInput.open(str(path))
