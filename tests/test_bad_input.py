@@ -214,6 +214,7 @@ def folder(tmp_path: Path) -> Path:
         (2, "'--convention': ", "scene.txt --convention invented"),
         (2, "picture.gif: expected a picture name ending in .jpg, ", "scene.txt -o picture.gif"),
         (2, "picture: expected a picture name ending in .jpg, ", "scene.txt -o picture"),
+        (2, "picture.jpg: expected at most 65500 pixels a side", "scene.txt --size 65501x1 -o picture.jpg"),
         (2, "'SCENE'", ""),
         (3, "missing/picture.png: cannot be written: no such file", "scene.txt -o missing/picture.png"),
         (3, "locked/picture.png: cannot be written: permission denied\n", "scene.txt -o locked/picture.png"),

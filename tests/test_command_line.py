@@ -348,3 +348,26 @@ def test_import_of_the_command_line_is_light() -> None:
     assert (
         subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, check=True).stdout == b"set()\n"
     )
+
+
+@pytest.mark.parametrize("ending", [".jpg", ".png", ".exr"])
+def test_drawing_imports_only_what_it_needs(ending: str, tmp_path: Path) -> None:
+    program = "import atexit, sys; atexit.register(lambda: print(*sys.modules)); import crossray; crossray.main()"
+    command = [sys.executable, "-c", program, "render", str(EXAMPLE), *SMALL, "-o", str(tmp_path / f"a{ending}")]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    imported = {name.partition(".")[0] for name in result.stdout.split()}
+    assert {"reference", "drjit", "numpy"} <= imported
+    rest = {"mitsuba", "skimage", "scipy", "matplotlib", "rich", "jinja2", "translator", "reports", "flint"}
+    assert not imported & (rest | ({"OpenImageIO"} if ending == ".jpg" else {"PIL"}))
+
+
+def test_large_pictures_are_never_whole_in_memory(tmp_path: Path) -> None:
+    """25 million pixels: 600 MB in double precision."""
+    if not Path("/proc/self/status").exists():
+        pytest.skip("the peak of memory is read from Linux's /proc")
+    show = "print(*[line for line in open('/proc/self/status') if line.startswith('VmHWM')])"
+    program = f"import atexit; atexit.register(lambda: {show}); import crossray; crossray.main()"
+    words = ["render", str(EXAMPLE), "--size", "5000x5000", "-o", str(tmp_path / "a.png")]
+    result = subprocess.run([sys.executable, "-c", program, *words], cwd=ROOT, capture_output=True, check=True)
+    assert int(result.stdout.split()[1]) < 550_000
+    assert read_image(tmp_path / "a.png").shape == (5000, 5000, 3)

@@ -97,6 +97,23 @@ def test_being_stopped_leaves_nothing_behind(number: signal.Signals, tmp_path: P
     assert not list(folders["out"].rglob(".crossray-*"))
 
 
+@pytest.mark.parametrize("ending", [".jpg", ".png", ".exr"])
+def test_being_stopped_while_drawing_keeps_the_old_picture(ending: str, tmp_path: Path) -> None:
+    picture = tmp_path / f"picture{ending}"
+    picture.write_bytes(b"what was here before")
+    command = [sys.executable, "-m", "crossray", "render", str(EXAMPLE), "--size", "16384x16384", "-o", str(picture)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        while len(list(tmp_path.iterdir())) == 1:
+            assert process.poll() is None
+            time.sleep(0.02)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=20)
+    assert (process.returncode, errors) == (130, "interrupted\n")
+    assert list(tmp_path.iterdir()) == [picture]
+    assert picture.read_bytes() == b"what was here before"
+
+
 def test_being_stopped_twice_with_much_to_do(tmp_path: Path) -> None:
     """Several renderers hang and ignore all they can, one of them when it is asked for its version; more are queued."""
     count = min(len(usable_cores()), 2)

@@ -152,6 +152,20 @@ def test_a_summary_line_is_one_line_whatever_is_in_it() -> None:
     assert all(line.isprintable() and "failed: bad: " in line for line in lines)
 
 
+def test_a_large_picture_shows_its_rows(tmp_path: Path) -> None:
+    screens = {}
+    for size in ("64x64", "4096x3000"):
+        screen = Screen()
+        command = [sys.executable, "-m", "crossray", "render", str(EXAMPLE), "--size", size, "-o", "a.png"]
+        environment = os.environ | {"TERM": "xterm", "COLUMNS": str(COLUMNS)}
+        subprocess.run(command, cwd=tmp_path, env=environment, stderr=screen.slave, timeout=60, check=True)
+        screens[size] = screen.text()
+    assert screens["64x64"] == ""
+    drawn = frames(screens["4096x3000"])
+    assert any(re.search(r"^rows .* \d+/3000 ", line) for frame in drawn for line in frame)
+    assert screens["4096x3000"].rindex("\x1b[?25h") > screens["4096x3000"].rindex("\x1b[?25l")
+
+
 def test_being_stopped_leaves_the_terminal_as_it_was(tmp_path: Path) -> None:
     """The whole command, with its standard error on a terminal; the renderers do not belong to that terminal."""
     notes = [tmp_path / "note"]
