@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain, islice, pairwise
 from pathlib import Path
-from statistics import median
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -166,6 +165,8 @@ def render(
         write_bands(output, size.width, size.height, bands)
     _say(f"{output}: {size}, {convention}, {precision} precision", quiet or not verbose)
     if time:
+        from statistics import median
+
         runs = [perf_counter()]
         for _ in range(TIMED_RUNS):
             deque(trace(), maxlen=0)

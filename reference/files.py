@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import errno
 import os
-import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -26,7 +25,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     Raises OutputError where the file cannot be written; what stood at `path` is then still there.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.parent / f".crossray-{secrets.token_hex(8)}{target.suffix}"
+    temporary = target.parent / f".crossray-{os.urandom(8).hex()}{target.suffix}"
     _begun.add(temporary)  # before it is there: a signal may end the program at any moment
     try:
         if target.exists() and not target.is_file():
