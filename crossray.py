@@ -14,7 +14,7 @@ from collections.abc import Generator, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain, islice, pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 DONE, DISAGREES, BAD_INPUT, NOT_DONE, SIGNALLED = 0, 1, 2, 3, 128
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SHOWN_WARNINGS = 20
+QUICK = 1 << 22  # pixels that need no progress bar
 TIMED_RUNS = 5
 SHORTEST_PROOF = 600.0  # seconds that proving a picture may take, whatever renderers may
 EMPTY = Scene((255.0, 255.0, 255.0), 0.1)
@@ -178,16 +179,14 @@ def render(
 
 
 def _watched(bands: Iterator[NDArray[Any]], size: Size, quiet: bool) -> Generator[NDArray[Any]]:
-    """The bands of a picture, the rows that are done on the terminal while there are more to come."""
-    first = next(bands)
-    if len(first) == size.height or quiet or not sys.stderr.isatty():
-        yield first
+    """The bands of a picture; for a large one, how many rows are done stands on the terminal meanwhile."""
+    if size.width * size.height <= QUICK or quiet or not sys.stderr.isatty():
         yield from bands
         return
     from reports.terminal import progress_lines
 
     with progress_lines(quiet, False, {"rows": size.height}) as show:
-        for band in chain([first], bands):
+        for band in bands:
             yield band
             show("rows", "", len(band))
 
