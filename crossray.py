@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import io
 import os
 import re
@@ -10,17 +9,16 @@ import signal
 import sys
 import warnings
 from collections import deque
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice, pairwise
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-import typer
-from typer.core import TyperCommand
+import click
 
 from reference.errors import CrossrayError, FailureError, InputError, SceneWarning, plain
 from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
@@ -39,28 +37,6 @@ TIMED_RUNS = 5
 SHORTEST_PROOF = 600.0  # seconds that proving a picture may take, whatever renderers may
 EMPTY = Scene((255.0, 255.0, 255.0), 0.1)
 
-app = typer.Typer(
-    add_completion=False,
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    help="""Draw the ray tracing assignment's scenes, here and in other renderers, and compare the pictures.
-
-    \b
-    crossray render scenes/example1.txt
-    crossray check homework.txt --out out/homework
-    """,
-)
-
-
-class Convention(enum.StrEnum):
-    """The readings of the assignment."""
-
-    document = "document"
-    published = "published"
-    exact = "exact"
-
 
 @dataclass(frozen=True)
 class Size:
@@ -74,14 +50,14 @@ class Size:
         """From a word on the command line, or a default."""
         match = re.fullmatch(r"([0-9]{1,6})[xX]([0-9]{1,6})", str(text))
         if not match or not all(1 <= int(side) <= LARGEST_SIDE for side in match.groups()):
-            raise typer.BadParameter(f"expected a size like 1000x1000, at most {LARGEST_SIDE} a side, found {text!r}")
+            raise click.BadParameter(f"expected a size like 1000x1000, at most {LARGEST_SIDE} a side, found {text!r}")
         return Size(int(match[1]), int(match[2]))
 
     def __str__(self) -> str:
         return f"{self.width}x{self.height}"
 
 
-class NamesCommand(TyperCommand):
+class NamesCommand(click.Command):
     """Lets `--with` and `--to` take several renderers at once: the names that follow them."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -102,47 +78,68 @@ class NamesCommand(TyperCommand):
         return super().parse_args(ctx, spread)
 
 
-def _split(names: list[str] | None) -> list[str]:
+def _split(names: Sequence[str]) -> list[str]:
     """Names that may come joined by commas, each once."""
-    return list(dict.fromkeys(name for joined in names or () for name in joined.split(",")))
+    return list(dict.fromkeys(name for joined in names for name in joined.split(",")))
 
 
-SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or - for standard input.")]
-SizeOption = Annotated[Size, typer.Option("--size", parser=Size.parse, metavar="WxH", help="Pixels across and down.")]
-DepthOption = Annotated[int, typer.Option("--depth", min=0, max=LARGEST_DEPTH, help="Bounces after the primary hit.")]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but results and errors.")]
-VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help="Say more about what is being done.")]
-TimeoutOption = Annotated[float, typer.Option("--timeout", min=1, help="Seconds that a renderer may take.")]
-SQUARE = Size(1000, 1000)
+PATH = click.Path(path_type=Path)
+CONVENTIONS = click.Choice(["document", "published", "exact"])  # the readings of the assignment
+scene_argument = click.argument("scene", metavar="SCENE", help="A scene file, or - for standard input.")
+size_option = click.option(
+    "--size", type=Size.parse, default="1000x1000", metavar="WxH", help="Pixels across and down."
+)
+depth_option = click.option(
+    "--depth", type=click.IntRange(0, LARGEST_DEPTH), default=3, help="Bounces after the primary hit."
+)
+quiet_option = click.option("--quiet", "-q", is_flag=True, help="Say nothing but results and errors.")
+verbose_option = click.option("--verbose", "-v", is_flag=True, help="Say more about what is being done.")
+json_option = click.option("--json", "as_json", is_flag=True, help="The same for programs.")
 
 
-def _show_version(wanted: bool) -> None:
+def _show_version(_context: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if wanted:
         print(f"crossray {_version()}")
-        raise typer.Exit
+        raise click.exceptions.Exit
 
 
-@app.callback()
-def _root(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None: ...
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
+@click.option(
+    "--version", is_flag=True, callback=_show_version, is_eager=True, expose_value=False, help="Print the version."
+)
+def app() -> None:
+    """Draw the ray tracing assignment's scenes, here and in other renderers, and compare the pictures.
+
+    \b
+    crossray render scenes/example1.txt
+    crossray check homework.txt --out out/homework
+    """
 
 
 @app.command()
+@scene_argument
+@click.option("--output", "-o", type=PATH, default=Path("scene.jpg"), help="JPEG, PNG or EXR.")
+@size_option
+@depth_option
+@click.option("--convention", type=CONVENTIONS, default="document", help="Which reading of the assignment.")
+@click.option("--precision", type=click.Choice(["double", "single"]), default="double", help="What to compute in.")
+@click.option("--device", type=click.Choice(["auto", "cpu", "gpu"]), default="auto", help="Where to compute.")
+@click.option("--show", is_flag=True, help="Show the picture in a window.")
+@click.option("--time", is_flag=True, help="Trace a few times more and print how long that takes.")
+@quiet_option
+@verbose_option
 def render(
-    scene: SceneArgument,
-    output: Annotated[Path, typer.Option("--output", "-o", help="JPEG, PNG or EXR.")] = Path("scene.jpg"),
-    size: SizeOption = SQUARE,
-    depth: DepthOption = 3,
-    convention: Annotated[Convention, typer.Option(help="Which reading of the assignment.")] = Convention.document,
-    precision: Annotated[Literal["double", "single"], typer.Option(help="What to compute in.")] = "double",
-    device: Annotated[Literal["auto", "cpu", "gpu"], typer.Option(help="Where to compute.")] = "auto",
-    show: Annotated[bool, typer.Option("--show", help="Show the picture in a window.")] = False,
-    time: Annotated[bool, typer.Option("--time", help="Trace a few times more and print how long that takes.")] = False,
-    quiet: QuietOption = False,
-    verbose: VerboseOption = False,
+    scene: str,
+    output: Path,
+    size: Size,
+    depth: int,
+    convention: str,
+    precision: str,
+    device: str,
+    show: bool,
+    time: bool,
+    quiet: bool,
+    verbose: bool,
 ) -> None:
     """Draw one scene.
 
@@ -192,17 +189,14 @@ def _watched(bands: Iterator[NDArray[Any]], size: Size, quiet: bool) -> Generato
 
 
 @app.command(cls=NamesCommand)
-def export(
-    scene: SceneArgument,
-    output: Annotated[Path, typer.Option("--output", "-o", help="A folder; each renderer gets one in it.")] = Path(
-        "export"
-    ),
-    to: Annotated[list[str] | None, typer.Option("--to", metavar="RENDERER ...", help="Default: all.")] = None,
-    size: SizeOption = SQUARE,
-    depth: DepthOption = 3,
-    quiet: QuietOption = False,
-    verbose: VerboseOption = False,
-) -> None:
+@scene_argument
+@click.option("--output", "-o", type=PATH, default=Path("export"), help="A folder; each renderer gets one in it.")
+@click.option("--to", multiple=True, metavar="RENDERER ...", help="Default: all.")
+@size_option
+@depth_option
+@quiet_option
+@verbose_option
+def export(scene: str, output: Path, to: Sequence[str], size: Size, depth: int, quiet: bool, verbose: bool) -> None:
     """Write a ready-to-run scene for other renderers and print the line that runs each.
 
     \b
@@ -237,19 +231,23 @@ def export(
 
 
 @app.command(cls=NamesCommand)
+@click.argument("scenes", nargs=-1, metavar="[SCENE]...", help="Scene files; default: the four examples.")
+@click.option("--out", type=PATH, default=Path("out"), help="The folder for the report and the pictures.")
+@click.option("--with", "renderers", multiple=True, metavar="RENDERER ...", help="Default: all that there are.")
+@size_option
+@depth_option
+@click.option("--timeout", type=click.FloatRange(min=1), default=600.0, help="Seconds that a renderer may take.")
+@quiet_option
+@verbose_option
 def check(
-    scenes: Annotated[
-        list[str] | None, typer.Argument(metavar="SCENE", help="Scene files; default: the four examples.")
-    ] = None,
-    out: Annotated[Path, typer.Option("--out", help="The folder for the report and the pictures.")] = Path("out"),
-    renderers: Annotated[
-        list[str] | None, typer.Option("--with", metavar="RENDERER ...", help="Default: all that there are.")
-    ] = None,
-    size: SizeOption = SQUARE,
-    depth: DepthOption = 3,
-    timeout: TimeoutOption = 600,
-    quiet: QuietOption = False,
-    verbose: VerboseOption = False,
+    scenes: Sequence[str],
+    out: Path,
+    renderers: Sequence[str],
+    size: Size,
+    depth: int,
+    timeout: float,
+    quiet: bool,
+    verbose: bool,
 ) -> None:
     """Draw scenes in every renderer, compare the pictures with the certified truth, and write a report.
 
@@ -288,17 +286,16 @@ def check(
         results = write_reports(out, lambda text: show("comparing", text, 1))
     _print("\n".join(summary_lines(results)))
     _say(f"{out / 'report.html'}", quiet)
-    raise typer.Exit(_exit_code(results, required))
+    raise click.exceptions.Exit(_exit_code(results, required))
 
 
 @app.command()
-def compare(
-    a: Annotated[Path, typer.Argument(help="The picture that is right.")],
-    b: Annotated[Path, typer.Argument(help="The picture to compare with it.")],
-    out: Annotated[Path | None, typer.Option("--out", help="A folder for a report.")] = None,
-    quiet: QuietOption = False,
-    verbose: VerboseOption = False,
-) -> None:
+@click.argument("a", type=PATH, help="The picture that is right.")
+@click.argument("b", type=PATH, help="The picture to compare with it.")
+@click.option("--out", type=PATH, help="A folder for a report.")
+@quiet_option
+@verbose_option
+def compare(a: Path, b: Path, out: Path | None, quiet: bool, verbose: bool) -> None:
     """Compare two pictures of the same size.
 
     \b
@@ -322,22 +319,29 @@ def compare(
             run.add_picture(entry, run.picture_file(renderer, path), levels)
         write_reports(out)
         _say(f"{out / 'report.html'}", quiet)
-    raise typer.Exit(DISAGREES if measured.over["0.5"] else DONE)
+    raise click.exceptions.Exit(DISAGREES if measured.over["0.5"] else DONE)
 
 
 @app.command()
+@scene_argument
+@click.argument("column", type=int, help="From the left, from 0.")
+@click.argument("row", type=int, help="From the top, from 0.")
+@size_option
+@depth_option
+@click.option("--convention", type=CONVENTIONS, multiple=True, help="Which reading; give two to see where they part.")
+@json_option
+@quiet_option
+@verbose_option
 def explain(
-    scene: SceneArgument,
-    column: Annotated[int, typer.Argument(help="From the left, from 0.")],
-    row: Annotated[int, typer.Argument(help="From the top, from 0.")],
-    size: SizeOption = SQUARE,
-    depth: DepthOption = 3,
-    convention: Annotated[
-        list[Convention] | None, typer.Option(help="Which reading; give two to see where they part.")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="The same for programs.")] = False,
-    quiet: QuietOption = False,
-    verbose: VerboseOption = False,
+    scene: str,
+    column: int,
+    row: int,
+    size: Size,
+    depth: int,
+    convention: Sequence[str],
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
 ) -> None:
     """Tell the rays behind one pixel, every term with its numbers.
 
@@ -354,7 +358,7 @@ def explain(
 
     loaded = _load(scene, quiet)
     pixel = {"column": column, "row": row, "width": size.width, "height": size.height, "depth": depth}
-    told = [explain(loaded, CONVENTIONS[name], **pixel) for name in convention or [Convention.document]]
+    told = [explain(loaded, CONVENTIONS[name], **pixel) for name in convention or ["document"]]
     if as_json:
         conventions = [dataclasses.asdict(explanation) for explanation in told]
         _print(json.dumps({"version": 1, "scene": scene, "conventions": conventions}, indent=1, allow_nan=False))
@@ -365,17 +369,23 @@ def explain(
 
 
 @app.command()
+@scene_argument
+@click.option("--output", "-o", type=PATH, help="The certified picture: EXR, PNG.")
+@click.option("--mask", type=PATH, help="A PNG: white is proven, grey a knife edge, black undecided.")
+@size_option
+@depth_option
+@json_option
+@quiet_option
+@verbose_option
 def certify(
-    scene: SceneArgument,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="The certified picture: EXR, PNG.")] = None,
-    mask: Annotated[
-        Path | None, typer.Option("--mask", help="A PNG: white is proven, grey a knife edge, black undecided.")
-    ] = None,
-    size: SizeOption = SQUARE,
-    depth: DepthOption = 3,
-    as_json: Annotated[bool, typer.Option("--json", help="The same for programs.")] = False,
-    quiet: QuietOption = False,
-    verbose: VerboseOption = False,
+    scene: str,
+    output: Path | None,
+    mask: Path | None,
+    size: Size,
+    depth: int,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
 ) -> None:
     """Prove every pixel of the exact picture, and list those that no precision can decide.
 
@@ -411,7 +421,9 @@ def certify(
 
 
 @app.command()
-def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
+@quiet_option
+@verbose_option
+def doctor(quiet: bool, verbose: bool) -> None:
     """Say what is installed, what works, and what to do about the rest.
 
     \b
@@ -443,7 +455,7 @@ def doctor(quiet: QuietOption = False, verbose: VerboseOption = False) -> None:
             _print(f"missing {name}: {renderer.INSTALL}")
     for offer in ignored_offers():
         _print(f"ignored {offer}")
-    raise typer.Exit(DONE if healthy else NOT_DONE)
+    raise click.exceptions.Exit(DONE if healthy else NOT_DONE)
 
 
 def main() -> None:

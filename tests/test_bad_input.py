@@ -210,7 +210,7 @@ def folder(tmp_path: Path) -> Path:
         (2, "<stdin>:15:1: expected the end of the file after the last plane, found '7'\n", "- -o picture.exr"),
         (2, "'--size': expected a size like 1000x1000, at most 65536 a side, found '10'", "scene.txt --size 10"),
         (2, "'--size': expected a size like 1000x1000, at most 65536 a side, found '0x10'", "scene.txt --size 0x10"),
-        (2, "'--depth': Input should be greater than or equal to 0", "scene.txt -o picture.png --depth -1"),
+        (2, "'--depth': -1 is not in the range 0<=x<=1048576", "scene.txt -o picture.png --depth -1"),
         (2, "'--convention': ", "scene.txt --convention invented"),
         (2, "picture.gif: expected a picture name ending in .jpg, ", "scene.txt -o picture.gif"),
         (2, "picture: expected a picture name ending in .jpg, ", "scene.txt -o picture"),

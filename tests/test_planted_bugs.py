@@ -11,8 +11,8 @@ from typing import Any
 import drjit as dr
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from helpers import ROOT, need, need_renderer
-from typer.testing import CliRunner
 
 from crossray import app
 from reference import EXACT, Scene, render

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from helpers import EXAMPLE, ROOT
 from random_scenes import random_scene
 from recorded import facts
-from typer.testing import CliRunner
 
 import reference.proof
 import reports.accounting
