@@ -1,116 +1,137 @@
-"""crossray beside POV-Ray and Mitsuba, in one run on one machine: medians, ratios first.
+"""How each contender's time is had: seconds from a scene at hand to the picture in memory.
 
-    make bench
-
-Tracing: the tracer's own time for 1000 x 1000 pixels and three bounces, in double precision, with a warm kernel, up to
-the picture in memory; for the others the time that they report themselves. Proving: every pixel, in the same process.
-Whole process: from the command to the picture on disk, for crossray with a warm kernel cache.
+crossray: a call of `render`, warm. Mitsuba: a rendering in a process that has rendered before, as our plugin reports
+it. POV-Ray, Tachyon and Radiance: what they report of tracing alone; each run is a new process. The C++ tracer: what
+it measures itself, warm. All use every core.
 """
 
 from __future__ import annotations
 
 import re
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Mapping
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from statistics import median
 from time import perf_counter
 
-from rich.console import Console
-from rich.table import Table
+import numpy as np
+from turns import Pace, Run, seconds
 
 from reference import Scene, render
-from reference.certification import certify
+from reference.device import PRECISIONS as KNOWN
 from reference.errors import RendererError
-from translator.contract import Settings
+from reference.text import dump
+from translator.contract import Export, Settings
+from translator.process import find_program, usable_cores
 from translator.registry import adapter
-from translator.run import command_line, draw, installed_version, write_export
+from translator.run import draw, export_scene, installed_version
 
-ROOT = Path(__file__).parent.parent.parent
-RUNS = 7  # rounds, after one that does not count
-RENDERS = 5  # of crossray's in a round
-PEERS = ("povray", "mitsuba")
-
-
-def seconds(action: Callable[[], object]) -> float:
-    start = perf_counter()
-    action()
-    return perf_counter() - start
-
-
-def render_seconds(scene: Scene, precision: str) -> float:
-    """crossray's tracing up to the picture in memory, the median of a few."""
-    return median(seconds(partial(render, scene, precision=precision)) for _ in range(RENDERS))
+DEPTH = 3  # bounces
+PRECISIONS = tuple(name for name in ("auto", "double", "single") if name in KNOWN)
+OURS = PRECISIONS[0]  # what ratios are to
+SCALAR = {"c++ double": "double", "c++ float": "float"}
+SOURCE = Path(__file__).with_name("scalar.cpp")
+COMPILE = ("g++", "-O3", "-march=native", "-ffast-math", "-fopenmp")
+COUNTING = ("g++", "-O1", "-DCOUNT", "-Wno-unknown-pragmas")
+LONG = 1.0  # seconds of a rendering from which on one a round is enough; the C++ tracer stops then, too
+CORES = len(usable_cores())
+PREPARED = {  # what a peer says that preparing the scene for tracing took, files not included
+    "povray": r"Bounding Time:.*\(([0-9.]+) seconds\)",
+    "tachyon": r"Preprocessing Time: +([0-9.]+) seconds",
+}
 
 
-def certify_seconds(scene: Scene) -> float:
-    """Proving every pixel, the median of a few."""
-    return median(seconds(partial(certify, scene)) for _ in range(RENDERS))
+def titles() -> dict[str, str]:
+    """The names of contenders as people know them."""
+    peers = {name: adapter(name).TITLE for name in ("povray", "tachyon", "mitsuba", "radiance")}
+    return peers | {name: name.replace("c++", "C++") for name in SCALAR} | {p: f"crossray {p}" for p in PRECISIONS}
 
 
-def trace_seconds(name: str, scene: Scene) -> float:
-    """What another renderer says its tracing took."""
-    renderer, settings = adapter(name), Settings()
-    _, log = draw(renderer.export(scene, settings), settings, timeout=600)
-    found = re.search(renderer.TIMING, log)
-    if not found:
-        raise RendererError(f"{renderer.TITLE} did not say how long it took", log)
-    return float(found[1])
+def missing(names: list[str]) -> dict[str, str]:
+    """The contenders that this machine lacks, and what to type."""
+    lacking = {name: adapter(name).INSTALL for name in names if name not in SCALAR and not installed_version(name)}
+    if not find_program("g++"):
+        lacking |= {name: "apt-get install g++" for name in names if name in SCALAR}
+    return lacking
 
 
-def in_turn(actions: Mapping[str, Callable[[], float]]) -> dict[str, list[float]]:
-    """The seconds of each action, run in turn so that a change of the machine's speed meets all alike."""
-    for action in actions.values():
-        action()
-    rounds = [{name: action() for name, action in actions.items()} for _ in range(RUNS)]
-    return {name: [times[name] for times in rounds] for name in actions}
+@dataclass(frozen=True)
+class Task:
+    """A scene to draw, `side` pixels wide and high."""
+
+    scene: Scene
+    side: int
+    pace: Pace
+
+    def contenders(self, names: list[str], ours: tuple[str, ...] = PRECISIONS) -> Mapping[str, Callable[[], Run]]:
+        """What draws it: crossray in double precision first, whose picture the others are compared with."""
+        order = sorted(ours, key=lambda precision: precision != "double")
+        peers = {name: partial(self.scalar if name in SCALAR else self.peer, name) for name in names}
+        return {precision: partial(self.crossray, precision) for precision in order} | peers
+
+    def crossray(self, precision: str) -> Run:
+        """Preparing is what a picture of a single pixel takes."""
+
+        def draw_it(side: int) -> object:
+            return render(self.scene, width=side, height=side, depth=DEPTH, precision=precision, device="cpu")
+
+        start = perf_counter()
+        picture = np.asarray(draw_it(self.side))  # the first to warm up, and to compare
+        renders = self.pace.renders if perf_counter() - start < LONG else 1
+        runs = [(seconds(partial(draw_it, self.side)), seconds(partial(draw_it, 1))) for _ in range(renders)]
+        return Run(median(whole for whole, _ in runs), median(one for _, one in runs), picture)
+
+    @cached_property
+    def settings(self) -> Settings:
+        return Settings(self.side, self.side, DEPTH, CORES)
+
+    def peer(self, name: str) -> Run:
+        """Another renderer, through its adapter."""
+        exports: dict[str, Export] = self.__dict__.setdefault("exports", {})
+        if name not in exports:
+            exports[name] = export_scene(name, self.scene, self.settings)
+        picture, log = draw(exports[name], self.settings, self.pace.timeout)
+        found = _number(adapter(name).TIMING, log)
+        if found is None:
+            raise RendererError(f"{adapter(name).TITLE} did not say how long it took", log)
+        return Run(found, _number(PREPARED.get(name, r"(?!)"), log), picture)
+
+    def scalar(self, name: str) -> Run:
+        """The plain C++ tracer."""
+        with tempfile.TemporaryDirectory(prefix="crossray-") as folder:
+            picture = Path(folder, "picture")
+            program = compiled(*COMPILE, f"-DREAL={SCALAR[name]}")
+            said = self._run_scalar(program, folder, str(self.pace.renders + 1), str(picture))
+            pixels = np.fromfile(picture, np.float32).reshape(self.side, self.side, 3)
+        times = list(map(float, said.split()))
+        return Run(median(times[1:] or times), None, pixels)
+
+    def counts(self) -> list[int]:
+        """What the C++ tracer computes for the picture: sums, products, comparisons, quotients, square roots."""
+        with tempfile.TemporaryDirectory(prefix="crossray-") as folder:
+            return list(map(int, self._run_scalar(compiled(*COUNTING), folder, "1").split()))
+
+    def _run_scalar(self, program: str, folder: str, *words: str) -> str:
+        path = Path(folder, "scene.txt")
+        path.write_text(dump(self.scene))
+        command = [program, str(path), str(self.side), str(DEPTH), *words]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
-def ratio(theirs: list[float], ours: list[float]) -> str:
-    """The median of the ratios round by round."""
-    return f"{median(a / b for a, b in zip(theirs, ours, strict=True)):.1f}x"
+def _number(pattern: str, log: str) -> float | None:
+    found = re.search(pattern, log)
+    return float(found[1]) if found else None
 
 
-def processes(path: Path, scene: Scene, folder: Path) -> Mapping[str, Callable[[], float]]:
-    """crossray's and POV-Ray's whole process on the same scene."""
-    export = adapter("povray").export(scene, Settings())
-    write_export(export, folder)
-    commands = {
-        "crossray": [sys.executable, "-m", "crossray", "render", str(path), "-o", str(folder / "scene.jpg")],
-        "povray": ["sh", "-c", "exec " + command_line(export)],
-    }
-    run = partial(subprocess.run, cwd=folder, check=True, capture_output=True)
-    return {name: partial(seconds, partial(run, command)) for name, command in commands.items()}
+_programs = tempfile.TemporaryDirectory(prefix="crossray-")
 
 
-def main() -> None:
-    peers = [name for name in PEERS if installed_version(name)]
-    tracing = Table("scene", *(f"{name} / crossray" for name in peers), "crossray double", "single", *peers)
-    whole = Table("scene", "povray / crossray", "crossray render", "povray")
-    proving = Table("scene", "certify / crossray double", "certify")
-    for path in sorted((ROOT / "scenes").glob("example?.txt")):
-        scene = Scene.load(path)
-        ours = {name: partial(render_seconds, scene, name) for name in ("double", "single")}
-        times = in_turn({"double": ours["double"], "certify": partial(certify_seconds, scene)})
-        proving.add_row(
-            path.stem, ratio(times["certify"], times["double"]), f"{1000 * median(times['certify']):.1f} ms"
-        )
-        times = in_turn(ours | {name: partial(trace_seconds, name, scene) for name in peers})
-        ratios = [ratio(times[name], times["double"]) for name in peers]
-        tracing.add_row(path.stem, *ratios, *(f"{1000 * median(taken):.1f} ms" for taken in times.values()))
-        if "povray" in peers:
-            with tempfile.TemporaryDirectory(prefix="crossray-") as folder:
-                times = in_turn(processes(path, scene, Path(folder)))
-            taken = [f"{median(times[name]):.2f} s" for name in ("crossray", "povray")]
-            whole.add_row(path.stem, ratio(times["povray"], times["crossray"]), *taken)
-    console = Console(width=110)
-    console.print("Tracing, 1000 x 1000, three bounces, medians:", tracing)
-    console.print("Proving every pixel, 1000 x 1000, three bounces, medians:", proving)
-    console.print("Whole process, scene file to picture file, medians:", whole)
-
-
-if __name__ == "__main__":
-    main()
+def compiled(*command: str) -> str:
+    """The C++ tracer, compiled by that command once."""
+    program = Path(_programs.name, str(abs(hash(command))))
+    if not program.exists():
+        subprocess.run([*command, str(SOURCE), "-o", str(program)], check=True, capture_output=True)
+    return str(program)

@@ -1,0 +1,93 @@
+"""The plots of the page, as SVG; one style, and a palette that colour-blind people can tell apart (Okabe and Ito)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+COLOURS = {  # and markers
+    "ours": ("#000000", "o"),
+    "auto": ("#000000", "o"),
+    "double": ("#999999", "P"),
+    "single": ("#555555", "X"),
+    "povray": ("#D55E00", "s"),
+    "tachyon": ("#0072B2", "^"),
+    "mitsuba": ("#009E73", "D"),
+    "radiance": ("#CC79A7", "v"),
+    "c++ double": ("#E69F00", "*"),
+    "c++ float": ("#56B4E9", "h"),
+}
+STYLE = {
+    "svg.hashsalt": "crossray",  # the same file for the same numbers
+    "font.size": 11,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#dddddd",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "figure.facecolor": "white",
+}
+Series = Mapping[str, Sequence[tuple[float, float]]]
+
+
+def draw_lines(path: Path, series: Series, names: Mapping[str, str], *labels: str, linear: bool = False) -> None:
+    """Points by contender joined by lines; both axes logarithmic, or with `linear` the second from 0 on."""
+    with mpl.rc_context(STYLE):
+        figure, axes = _figure(*labels)
+        for name, points in series.items():
+            if points:
+                colour, marker = COLOURS[name]
+                axes.plot(*zip(*points, strict=True), color=colour, marker=marker, label=names[name], linewidth=1.8)
+        axes.set_xscale("log")
+        if linear:
+            axes.set_ylim(bottom=0)
+        else:
+            axes.set_yscale("log")
+        axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+        _save(figure, path)
+
+
+def draw_bars(
+    path: Path,
+    groups: Mapping[str, Mapping[str, float]],
+    names: Mapping[str, str],
+    targets: Mapping[str, float],
+    *labels: str,
+) -> None:
+    """A group of bars a scene, one for each contender, on a logarithmic axis from 1 on; targets are dashes."""
+    contenders = [name for name in COLOURS if any(name in bars for bars in groups.values())]
+    width = 0.85 / max(1, len(contenders))
+    with mpl.rc_context(STYLE):
+        figure, axes = _figure(*labels)
+        for place, name in enumerate(contenders):
+            xs = [index + (place - (len(contenders) - 1) / 2) * width for index in range(len(groups))]
+            heights = [bars.get(name, float("nan")) for bars in groups.values()]
+            bars = axes.bar(xs, heights, width * 0.92, color=COLOURS[name][0], label=names[name])
+            axes.bar_label(bars, [f"{height:.3g}" if height == height else "" for height in heights], fontsize=8)
+            if name in targets:
+                axes.hlines(
+                    [targets[name]] * len(xs), [x - width / 2 for x in xs], [x + width / 2 for x in xs], "black"
+                )
+        axes.set_yscale("log")
+        axes.set_xticks(range(len(groups)), list(groups))
+        axes.grid(False, axis="x")
+        axes.axhline(1, color="black", linewidth=0.8)
+        axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+        _save(figure, path)
+
+
+def _figure(title: str, across: str, up: str) -> tuple[Figure, Any]:
+    figure = Figure(figsize=(9, 4.5), layout="constrained")
+    axes = figure.subplots()
+    axes.set(xlabel=across, ylabel=up)
+    axes.set_title(title, loc="left", fontsize=12)
+    return figure, axes
+
+
+def _save(figure: Figure, path: Path) -> None:
+    figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None, dpi=110)
