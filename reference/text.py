@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from reference.errors import SceneError, SceneWarning
+from reference.plain import parse_plain
 from reference.scene import Plane, Scene, Sphere, Triple
 
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -45,6 +46,11 @@ def load(path: str | Path) -> Scene:
 def parse(text: str | bytes, path: str = "<text>") -> Scene:
     """Read a scene from text or from the bytes of a file (UTF-8, with or without a byte order mark)."""
     text = _decode(text, path) if isinstance(text, bytes) else text.removeprefix("\ufeff")
+    return parse_plain(text) or parse_carefully(text, path)
+
+
+def parse_carefully(text: str, path: str) -> Scene:
+    """Read a scene line by line, so that every refusal and warning has its place."""
     reader = _Reader(text, path)
     ambient = reader.colour("the ambient colour")
     coefficient = reader.coefficient("the ambient coefficient")
