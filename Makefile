@@ -10,7 +10,7 @@ HAS_ATOMIC := $(PYTHON) -c 'import ctypes; ctypes.CDLL("libatomic.so.1")'
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help report test lint bench soundness docs pictures lock renderers cycles browser clean
+.PHONY: help report test lint bench soundness docs pictures lock renderers cycles compiler browser clean
 
 help:  ## Say what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -26,8 +26,8 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-bench: $(READY) renderers  ## Time the tracer beside POV-Ray and print the ratios
-	$(BIN)/python tests/benchmarks/peers.py
+bench: $(READY) renderers compiler  ## Time the tracer beside its peers and write docs/benchmarks.md (15 minutes)
+	$(BIN)/python tests/benchmarks/bench.py
 
 soundness: $(READY)  ## Prove certified pixels a second time, every one, with Arb (minutes)
 	$(BIN)/python tests/benchmarks/soundness.py
@@ -60,6 +60,9 @@ cycles: $(READY)  ## Install Blender Cycles too (374 MB, Python 3.11 only), or s
 	@test -f $(CYCLES) && test $(CYCLES) -nt requirements-cycles.txt || { echo "installing Blender Cycles"; \
 		$(BIN)/python -m pip install --quiet --no-deps --require-hashes --only-binary :all: -r requirements-cycles.txt \
 		&& touch $(CYCLES); } || echo "missing: Blender Cycles, without which the rest works" >&2
+
+compiler:
+	@command -v g++ >/dev/null || $(call debian,g++,g++)
 
 browser:
 	@command -v chromium >/dev/null || $(call debian,chromium,chromium)

@@ -47,7 +47,7 @@ PARTS: dict[str, Part] = {
 TRIALS: dict[str, Part] = {
     "examples": partial(measure_examples, side=64, number=1),
     "objects": partial(measure_objects, side=64, numbers=(10, 100)),
-    "sizes": partial(measure_sizes, sides=(32, 64)),
+    "sizes": partial(measure_sizes, sides=(64,)),
     "process": partial(measure_process, side=64, number=1),
     "roofline": partial(measure_roofline, side=64, number=1),
 }

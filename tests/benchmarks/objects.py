@@ -50,7 +50,8 @@ def too_long(name: str, number: int, last: Entry | None) -> str | None:
     expected = (last["seconds"][-1] if scalar else last["whole"]) * number / last["number"]
     if expected <= (LONGEST_SCALAR if scalar else LONGEST):
         return None
-    return f"not tried: with {last['number']:,} a run took {expected / number * last['number']:.0f} s"
+    taken = expected / number * last["number"]
+    return f"not tried: {'tracing' if scalar else 'a whole run'} took {taken:.0f} s with {last['number']:,}"
 
 
 def growth(rows: dict[str, Any], name: str, time: Callable[[Entry], float]) -> float | None:

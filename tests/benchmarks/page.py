@@ -335,7 +335,8 @@ What is timed:
 
 - crossray: a call of `render`, from the scene in memory to the picture in memory, float32, with its kernel compiled;
   five calls a round.
-- Mitsuba 3: what our plugin reports, the median of five renderings after one that compiled, in a new process.
+- Mitsuba 3: a rendering by our plugin in a process that has rendered before, the median of five, with `dr.freeze` or
+  without, whichever is faster. `crossray check` shows the time without.
 - POV-Ray and Tachyon: what they report of tracing alone, without parsing, bounding or preprocessing and files. Each
   round is a new process, as they draw once in each.
 - Radiance: its `rtrace` processes, from start to end, for both layers of the picture.
@@ -382,8 +383,8 @@ The times:
 Time grows as the number of spheres to the power of (fitted from 1,000 on): {growth}.
 
 Preparing the scene: of crossray, what a picture of a single pixel takes, from the scene in memory, in every call of
-`render`; of POV-Ray its bounding, of Tachyon its preprocessing; Mitsuba reports none. Reading is of crossray's own
-scene file, in Python.
+`render`; of POV-Ray its bounding, of Tachyon its preprocessing, of Mitsuba loading the scene file, compiling excluded.
+Reading is of crossray's own scene file, in Python.
 
 {ready}
 Pixels over half a level off crossray's picture in double precision, or in what comes next where that was not tried:

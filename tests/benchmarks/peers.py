@@ -1,7 +1,7 @@
 """How each contender's time is had: seconds from a scene at hand to the picture in memory.
 
-crossray: a call of `render`, warm. Mitsuba: a rendering in a process that has rendered before, as our plugin reports
-it. POV-Ray, Tachyon and Radiance: what they report of tracing alone; each run is a new process. The C++ tracer: what
+crossray: a call of `render`, warm. Mitsuba: a rendering in a process that has rendered before, by mitsuba_warm.py.
+POV-Ray, Tachyon and Radiance: what they report of tracing alone; each run is a new process. The C++ tracer: what
 it measures itself, warm. All use every core.
 """
 
@@ -11,7 +11,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from statistics import median
@@ -34,13 +34,15 @@ PRECISIONS = tuple(name for name in ("auto", "double", "single") if name in KNOW
 OURS = PRECISIONS[0]  # what ratios are to
 SCALAR = {"c++ double": "double", "c++ float": "float"}
 SOURCE = Path(__file__).with_name("scalar.cpp")
+WARM = Path(__file__).with_name("mitsuba_warm.py")
 COMPILE = ("g++", "-O3", "-march=native", "-ffast-math", "-fopenmp")
 COUNTING = ("g++", "-O1", "-DCOUNT", "-Wno-unknown-pragmas")
-LONG = 1.0  # seconds of a rendering from which on one a round is enough; the C++ tracer stops then, too
+LONG = 1.0  # seconds of a rendering from which on one a round is enough; so it is in scalar.cpp
 CORES = len(usable_cores())
 PREPARED = {  # what a peer says that preparing the scene for tracing took, files not included
     "povray": r"Bounding Time:.*\(([0-9.]+) seconds\)",
     "tachyon": r"Preprocessing Time: +([0-9.]+) seconds",
+    "mitsuba": r"loaded in ([0-9.]+) s",
 }
 
 
@@ -92,12 +94,19 @@ class Task:
         """Another renderer, through its adapter."""
         exports: dict[str, Export] = self.__dict__.setdefault("exports", {})
         if name not in exports:
-            exports[name] = export_scene(name, self.scene, self.settings)
+            export = export_scene(name, self.scene, self.settings)
+            exports[name] = self.warm(export) if name == "mitsuba" else export
         picture, log = draw(exports[name], self.settings, self.pace.timeout)
         found = _number(adapter(name).TIMING, log)
         if found is None:
             raise RendererError(f"{adapter(name).TITLE} did not say how long it took", log)
         return Run(found, _number(PREPARED.get(name, r"(?!)"), log), picture)
+
+    def warm(self, export: Export) -> Export:
+        """Mitsuba's export with a program of ours that draws it as quickly as it can."""
+        options = ("--threads", str(CORES), "--renders", str(self.pace.renders), "--long", str(LONG))
+        command = (*export.command[:1], WARM.name, "scene.xml", export.image, *options)
+        return replace(export, files={**export.files, WARM.name: WARM.read_text()}, command=command)
 
     def scalar(self, name: str) -> Run:
         """The plain C++ tracer."""
