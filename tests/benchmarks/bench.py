@@ -25,8 +25,8 @@ from examples import measure_examples, measure_process
 from objects import measure_objects
 from page import draw_plots, page
 from peers import COMPILE, CORES, DEPTH, OURS
+from pixels import measure_sizes
 from roofline import measure_roofline
-from sizes import measure_sizes
 from turns import QUICK, Pace
 
 from reference.errors import RendererError

@@ -294,8 +294,8 @@ def page(results: Results) -> str:
 def draw_plots(results: Results, folder: Path) -> None:
     """The plots that the page shows, beside it."""
     if part := results.get("examples"):
-        label = f"times slower than {TITLES[ours(part)]}"
-        title = f"The examples, {part['side']} x {part['side']} pixels, three bounces (lines: targets)"
+        label = f"time / time of {TITLES[ours(part)]}"
+        title = f"The examples, {part['side']} x {part['side']} pixels, three bounces (black lines: targets)"
         draw_bars(folder / "benchmarks-examples.svg", example_ratios(part), TITLES, TARGETS, title, "", label)
     if part := results.get("objects"):
         rows = tracing_only(part["rows"])

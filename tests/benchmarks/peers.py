@@ -11,8 +11,8 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -67,6 +67,7 @@ class Task:
     scene: Scene
     side: int
     pace: Pace
+    exports: dict[str, Export] = field(default_factory=dict, repr=False)  # that were made
 
     def contenders(self, names: list[str], ours: tuple[str, ...] = PRECISIONS) -> Mapping[str, Callable[[], Run]]:
         """What draws it: crossray in double precision first, whose picture the others are compared with."""
@@ -86,17 +87,16 @@ class Task:
         runs = [(seconds(partial(draw_it, self.side)), seconds(partial(draw_it, 1))) for _ in range(renders)]
         return Run(median(whole for whole, _ in runs), median(one for _, one in runs), picture)
 
-    @cached_property
+    @property
     def settings(self) -> Settings:
         return Settings(self.side, self.side, DEPTH, CORES)
 
     def peer(self, name: str) -> Run:
         """Another renderer, through its adapter."""
-        exports: dict[str, Export] = self.__dict__.setdefault("exports", {})
-        if name not in exports:
+        if name not in self.exports:
             export = export_scene(name, self.scene, self.settings)
-            exports[name] = self.warm(export) if name == "mitsuba" else export
-        picture, log = draw(exports[name], self.settings, self.pace.timeout)
+            self.exports[name] = self.warm(export) if name == "mitsuba" else export
+        picture, log = draw(self.exports[name], self.settings, self.pace.timeout)
         found = _number(adapter(name).TIMING, log)
         if found is None:
             raise RendererError(f"{adapter(name).TITLE} did not say how long it took", log)

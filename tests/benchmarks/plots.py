@@ -8,9 +8,9 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 COLOURS = {  # and markers
-    "ours": ("#000000", "o"),
     "auto": ("#000000", "o"),
     "double": ("#999999", "P"),
     "single": ("#555555", "X"),
@@ -35,8 +35,8 @@ STYLE = {
 Series = Mapping[str, Sequence[tuple[float, float]]]
 
 
-def draw_lines(path: Path, series: Series, names: Mapping[str, str], *labels: str, linear: bool = False) -> None:
-    """Points by contender joined by lines; both axes logarithmic, or with `linear` the second from 0 on."""
+def draw_lines(path: Path, series: Series, names: Mapping[str, str], *labels: str) -> None:
+    """Points by contender joined by lines, on logarithmic axes; labels: the title, then of the axes."""
     with mpl.rc_context(STYLE):
         figure, axes = _figure(*labels)
         for name, points in series.items():
@@ -44,10 +44,10 @@ def draw_lines(path: Path, series: Series, names: Mapping[str, str], *labels: st
                 colour, marker = COLOURS[name]
                 axes.plot(*zip(*points, strict=True), color=colour, marker=marker, label=names[name], linewidth=1.8)
         axes.set_xscale("log")
-        if linear:
-            axes.set_ylim(bottom=0)
-        else:
-            axes.set_yscale("log")
+        across = sorted({x for points in series.values() for x, _ in points})
+        axes.set_xticks(across, [f"{x:,.0f}" for x in across])
+        axes.xaxis.set_minor_locator(NullLocator())
+        _scale_up(axes)
         axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
         _save(figure, path)
 
@@ -59,7 +59,7 @@ def draw_bars(
     targets: Mapping[str, float],
     *labels: str,
 ) -> None:
-    """A group of bars a scene, one for each contender, on a logarithmic axis from 1 on; targets are dashes."""
+    """A group of bars a scene, one for each contender, on a logarithmic axis; lines across the bars are targets."""
     contenders = [name for name in COLOURS if any(name in bars for bars in groups.values())]
     width = 0.85 / max(1, len(contenders))
     with mpl.rc_context(STYLE):
@@ -73,7 +73,7 @@ def draw_bars(
                 axes.hlines(
                     [targets[name]] * len(xs), [x - width / 2 for x in xs], [x + width / 2 for x in xs], "black"
                 )
-        axes.set_yscale("log")
+        _scale_up(axes)
         axes.set_xticks(range(len(groups)), list(groups))
         axes.grid(False, axis="x")
         axes.axhline(1, color="black", linewidth=0.8)
@@ -87,6 +87,12 @@ def _figure(title: str, across: str, up: str) -> tuple[Figure, Any]:
     axes.set(xlabel=across, ylabel=up)
     axes.set_title(title, loc="left", fontsize=12)
     return figure, axes
+
+
+def _scale_up(axes: Any) -> None:
+    """A logarithmic axis with plain numbers."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
 
 
 def _save(figure: Figure, path: Path) -> None:
