@@ -171,7 +171,10 @@ def nanoseconds(entry: Entry | None, side: str) -> float | None:
 
 def _per_pixel(entry: Entry | None, side: str) -> str:
     value = nanoseconds(entry, side)
-    return f"{value:.3g} ns" if value is not None else spread(entry)
+    if value is None or not entry:
+        return spread(entry)
+    least, most = (1e9 * end(entry["seconds"]) / int(side) ** 2 for end in (min, max))
+    return f"{value:.3g} ns ({least:.3g} to {most:.3g})" if len(entry["seconds"]) > 1 else f"{value:.3g} ns (once)"
 
 
 def process_section(part: Results) -> str:
@@ -394,8 +397,8 @@ Pixels over half a level off crossray's picture in double precision, or in what 
 SIZES = """\
 ## The size of the picture
 
-{scene}, square, {ours} band by band as for a file, in a new process whose peak memory, Python included, is given
-too.
+{scene} as a square; nanoseconds a pixel. {ours} draws band by band, as for a file, in a new process, whose peak memory
+is given too, Python included.
 
 {ratios}
 ![time per pixel against size](benchmarks-sizes.svg)

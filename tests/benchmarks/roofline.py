@@ -18,7 +18,7 @@ from turns import Pace, Run, in_turn, seconds
 
 from reference.device import load_drjit
 
-LANES, CHAINS, LENGTH, TURNS = 1 << 15, 8, 16, 64  # values at a time, of which each is the end of so long a chain
+LANES, CHAINS, LENGTH, TURNS = 1 << 15, 12, 16, 64  # values at a time, of which each is the end of so long a chain
 BYTES = 1 << 28  # of an array that is filled
 OPERATIONS = ("sums", "products", "comparisons", "quotients", "roots")
 FLOATS = {"single": "Float32", "double": "Float64"}
