@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ STYLE = {
     "legend.frameon": False,
     "figure.facecolor": "white",
 }
+NEAR = 1.25  # a line that much above a bar is in the way of its number
 Series = Mapping[str, Sequence[tuple[float, float]]]
 
 
@@ -67,12 +69,15 @@ def draw_bars(
         for place, name in enumerate(contenders):
             xs = [index + (place - (len(contenders) - 1) / 2) * width for index in range(len(groups))]
             heights = [bars.get(name, float("nan")) for bars in groups.values()]
-            bars = axes.bar(xs, heights, width * 0.92, color=COLOURS[name][0], label=names[name])
-            axes.bar_label(bars, [f"{height:.3g}" if height == height else "" for height in heights], fontsize=8)
-            if name in targets:
-                axes.hlines(
-                    [targets[name]] * len(xs), [x - width / 2 for x in xs], [x + width / 2 for x in xs], "black"
-                )
+            axes.bar(xs, heights, width * 0.92, color=COLOURS[name][0], label=names[name])
+            target = targets.get(name, 0.0)
+            if target:
+                axes.hlines([target] * len(xs), [x - width / 2 for x in xs], [x + width / 2 for x in xs], "black")
+            for x, height in zip(xs, heights, strict=True):
+                above = target if height <= target < NEAR * height else height  # the number is clear of the line
+                if isfinite(height):
+                    shown = f"{height:.0f}" if height >= 10 else f"{height:.1f}"
+                    axes.annotate(shown, (x, above), (0, 2), textcoords="offset points", ha="center", fontsize=8)
         _scale_up(axes)
         axes.set_xticks(range(len(groups)), list(groups))
         axes.grid(False, axis="x")
