@@ -170,6 +170,15 @@ def test_contenders_take_turns() -> None:
     assert times_faster(entries["bb"], entries["a"]) == 2
     assert times_faster(entries["bad"], entries["a"]) is None
     assert spread(entries["bad"]) == "it broke"
+    breaking = iter([Run(1.0)])
+
+    def break_later() -> Run:
+        if run := next(breaking, None):
+            return run
+        raise RendererError("it broke later")
+
+    (broken,) = in_turn({"a": break_later}, Pace(rounds=2, budget=100)).values()
+    assert broken == {"reason": "it broke later"}
     (slow,) = in_turn({"a": contender("a", 3)}, Pace(budget=0)).values()
     assert slow["cold"]
     assert slow["seconds"] == [3]

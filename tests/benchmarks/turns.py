@@ -72,8 +72,11 @@ def in_turn(actions: Mapping[str, Callable[[], Run]], pace: Pace) -> dict[str, E
             entry["off"] = pixels_off(run.picture, first)
     for round_ in range(max(left.values(), default=0)):
         for name in left:
-            if round_ < left[name]:
-                _keep(entries[name], actions[name]())
+            if round_ < left[name] and "reason" not in entries[name]:
+                try:
+                    _keep(entries[name], actions[name]())
+                except CrossrayError as error:
+                    entries[name] = {"reason": str(error)}
     return entries
 
 
