@@ -23,18 +23,20 @@ class Ray:
 def nearest(world: World, window: Window, ray: Ray, active: Mask) -> tuple[Number, Number]:
     """Distance and index of the first surface along each ray; of a tie the first listed, NOTHING for a miss."""
 
-    def closer(index: Number, t: Number, counts: Mask, best: Number, hit: Number) -> State:
+    def meet_sphere(index: Number, row: list[Number], best: Number, hit: Number, listed: Number) -> State:
+        t, counts = reach_sphere(world, window, ray, index, row)
+        counts &= (t < best) | ((t == best) & (row[5] < listed)) if world.tree else t < best
+        return dr.select(counts, t, best), dr.select(counts, index, hit), dr.select(counts, row[5], listed)
+
+    def meet_plane(index: Number, row: list[Number], best: Number, hit: Number, listed: Number) -> State:
+        t, counts = reach_plane(world, window, ray, index, row)
         counts &= t < best
-        return dr.select(counts, t, best), dr.select(counts, index, hit)
+        return dr.select(counts, t, best), dr.select(counts, index, hit), listed
 
-    def meet_sphere(index: Number, row: list[Number], best: Number, hit: Number) -> State:
-        return closer(index, *reach_sphere(world, window, ray, index, row), best, hit)
-
-    def meet_plane(index: Number, row: list[Number], best: Number, hit: Number) -> State:
-        return closer(index, *reach_plane(world, window, ray, index, row), best, hit)
-
-    miss = (world.Float(dr.inf), world.Index(NOTHING))
-    return world.through(meet_sphere, meet_plane, miss, lambda *_: active)
+    miss = (world.Float(dr.inf), world.Index(NOTHING), world.Float(0))
+    path = world.path(ray, lambda best, *_: best)
+    t, hit, _ = world.through(meet_sphere, meet_plane, miss, lambda *_: active, path)
+    return t, hit
 
 
 def reach_sphere(world: World, window: Window, ray: Ray, index: Number, row: list[Number]) -> tuple[Number, Mask]:
@@ -71,5 +73,6 @@ def blocked(world: World, ray: Ray, active: Mask) -> Mask:
         t = model.plane_distance(q, normal, facing, left)
         return (dark | window.plane(t, facing, left),)
 
-    (dark,) = world.through(meet_sphere, meet_plane, (world.Mask(False),), lambda dark: active & ~dark)
+    path = world.path(ray, lambda dark: world.Float(1))
+    (dark,) = world.through(meet_sphere, meet_plane, (world.Mask(False),), lambda dark: active & ~dark, path)
     return dark

@@ -7,7 +7,7 @@ values. Distances t count in units of the ray's direction, which is not normalis
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import drjit as dr
@@ -103,7 +103,7 @@ def reflected_direction(d: Vector, normal: Vector) -> Vector:
 
 
 def mirrored(d: Vector, normal: Vector) -> Vector:
-    """d - 2 (d.n) n, as long as d."""
+    """The direction d - 2 (d.n) n, as long as d."""
     return dr.fma(normal, -2 * dr.dot(d, normal), d)
 
 
@@ -179,3 +179,9 @@ PUBLISHED = replace(
 )
 
 CONVENTIONS = {model.name: model for model in (DOCUMENT, PUBLISHED, EXACT)}
+
+
+def is_convention(model: Model) -> bool:
+    """Whether this is one of the conventions, wherever the camera's rays go: what searches and proofs are about."""
+    steps = [field.name for field in fields(Model) if field.name not in ("name", "summary", "camera_direction")]
+    return any(all(getattr(model, step) is getattr(known, step) for step in steps) for known in CONVENTIONS.values())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import chain
 from math import dist, hypot, isclose
 from pathlib import Path
 from typing import TypeVar
@@ -107,11 +108,16 @@ def merge_coincident(scene: Scene) -> Scene:
 
     Compared on the decimals as written, without rounding. Planes coincide whichever way their normals point.
     """
-    return replace(
-        scene,
-        spheres=tuple(distinct_spheres(scene).values()),
-        planes=tuple(distinct_planes(scene).values()),
-    )
+    spheres: dict[tuple[Triple, float], Sphere] = {}
+    for sphere in scene.spheres:
+        spheres.setdefault((sphere.centre, sphere.radius), sphere)
+    return replace(scene, spheres=tuple(spheres.values()), planes=tuple(distinct_planes(scene).values()))
+
+
+def extent(scene: Scene) -> float:
+    """The largest coordinate or radius, by magnitude."""
+    numbers = chain.from_iterable((*s.centre, s.radius) for s in scene.spheres)
+    return max(map(abs, chain(numbers, *(p.point for p in scene.planes))), default=0.0)
 
 
 def distinct_spheres(scene: Scene) -> dict[str, Sphere]:

@@ -73,7 +73,7 @@ class BallWorld(Rows):
             ambient = [_nearest(value)[0] for value in tables.ambient]
         super().__init__(types, len(scene.spheres), geometry, WIDTH)
         self.materials = Rows(types, len(scene.spheres), materials(scene), MATERIAL)
-        self.fading = all(abs(mirror) <= 1 for _, _, _, _, mirror, *_ in materials(scene))
+        self.fading = all(abs(mirror) <= 1 for mirror in materials(scene)[:, 4])
         self.ambient = self.Vector(*map(self.uniform, ambient))
         self.brightest = self.uniform(max(map(abs, ambient)))
         self.eye, self.light = self.held(EYE), self.held(LIGHT)

@@ -6,37 +6,54 @@ values, one kernel for each pair of counts; beyond that it loops over the surfac
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import chain
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from reference.device import Types
-from reference.model import Mask, Number
+from reference.model import Mask, Number, Vector
 from reference.scene import Plane, Scene, Sphere
+
+if TYPE_CHECKING:
+    from reference.acceleration import Tree
 
 UNROLLED = 16  # surfaces; beyond this, compile time outweighs what straight code gains
 BAND = 1 << 22  # pixels a kernel launch, which bounds the memory of large pictures
 MATERIAL = 8  # numbers in a row of materials
+FEW = 4096  # numbers that are quicker handed over one by one
 NOTHING = 0xFFFFFFFF  # the index of no surface
 
 State = tuple[Number, ...]
 Step = Callable[..., State]
 
 
-class Rows:
-    """Numbers of each surface, spheres before planes: `width` (a multiple of four) to a row."""
+class Path(NamedTuple):
+    """Where rays go, in single precision: what a tree needs to know to pass spheres over."""
 
-    def __init__(self, types: Types, spheres: int, rows: list[State], width: int, straight: bool = True) -> None:
+    origin: Vector
+    d: Vector
+    margin: Number  # how far rays and spheres may be off
+    reach: Callable[..., Number]  # of the state: the t beyond which nothing matters
+
+
+class Rows:
+    """Numbers of each surface, spheres before planes: `width` (a multiple of four) to a row.
+
+    Where there is a `tree` of the spheres, they are in its order.
+    """
+
+    def __init__(self, types: Types, spheres: int, rows: ArrayLike, width: int, tree: Tree | None = None) -> None:
         self.Float, self.Index, self.Mask = types.Float, types.Index, types.Mask
         self.Vector, self.Packet, self.Double = types.Vector3, types.Vector4, types.Double
-        self.spheres, self.surfaces, self.width = spheres, len(rows), width
-        # Of zeros where there is no row, so that there is something to gather. From a list: Dr.Jit borrows NumPy
-        # arrays where they lie, and the kernel would depend on how they are aligned.
-        self.numbers = self.Float(list(chain.from_iterable(rows or [(0.0,) * width])))
-        self.straight = (
-            [[self.uniform(value) for value in row] for row in rows] if straight and len(rows) <= UNROLLED else []
-        )
+        self.tree = tree
+        table = np.asarray(rows, np.float64 if self.Float is self.Double else np.float32).reshape(-1, width)
+        self.straight = [list(map(self.uniform, row.tolist())) for row in table] if len(table) <= UNROLLED else []
+        self.numbers = upload(self.Float, table)
+        self.spheres, self.surfaces, self.width = spheres, len(table), width
         self.first_plane = dr.opaque(self.Index, spheres)
 
     def uniform(self, value: float) -> Number:
@@ -66,10 +83,32 @@ class Rows:
         _, *folded = dr.while_loop((start, *state), lambda index, *state: (index < end) & going(*state), body)
         return tuple(folded)
 
-    def through(self, meet_sphere: Step, meet_plane: Step, state: State, going: Callable[..., Mask]) -> State:
-        """Fold all surfaces into the state."""
-        state = self.fold(0, self.spheres, meet_sphere, state, going)
+    def through(
+        self, meet_sphere: Step, meet_plane: Step, state: State, going: Callable[..., Mask], path: Path | None = None
+    ) -> State:
+        """Fold all surfaces into the state; of the spheres, those that rays may meet on their path."""
+        if self.tree and path:
+            step = lambda place, sphere, *state: meet_sphere(place, self.known(place, sphere), *state)  # noqa: E731
+            state = self.tree.fold(*path, step, state, going)
+        else:
+            state = self.fold(0, self.spheres, meet_sphere, state, going)
         return self.fold(self.spheres, self.surfaces, meet_plane, state, going)
+
+    def known(self, index: Number, sphere: list[Number]) -> list[Number]:
+        """The row of a sphere whose centre and radius are known in single precision."""
+        return self.row(index) if self.width > len(sphere) else sphere
+
+
+def upload(kind: Any, numbers: NDArray[Any]) -> Any:
+    """Numbers in a Dr.Jit array of a kind, with memory of its own; zeros where there is none, to gather from."""
+    flat = numbers.ravel() if numbers.size else np.zeros(12, numbers.dtype)
+    if len(flat) <= FEW:
+        return kind(flat.tolist())
+    # Dr.Jit borrows NumPy's memory, and its kernels depend on how that happens to be aligned.
+    copy = kind(flat) + dr.opaque(kind, 0)
+    dr.eval(copy)
+    dr.sync_thread()  # before NumPy's memory goes
+    return copy
 
 
 def _pick(column: State, masks: list[Mask]) -> Number:
@@ -79,10 +118,19 @@ def _pick(column: State, masks: list[Mask]) -> Number:
     return first
 
 
-def materials(scene: Scene) -> list[State]:
+def column(surfaces: Sequence[Sphere | Plane], name: str) -> NDArray[np.float64]:
+    """One property of all surfaces: surfaces x how many numbers it has."""
+    values = np.array(list(map(attrgetter(name), surfaces)), np.float64)
+    return values.reshape(len(surfaces), -1 if len(surfaces) else 1)
+
+
+def materials(scene: Scene) -> NDArray[np.float64]:
     """A row of eight for each surface: its colour, diffuse and reflection coefficient, and zeros."""
     surfaces: tuple[Sphere | Plane, ...] = (*scene.spheres, *scene.planes)
-    return [(*s.colour, s.diffuse, s.reflection, 0, 0, 0) for s in surfaces]
+    rows = np.zeros((len(surfaces), MATERIAL))
+    for name, place in (("colour", slice(0, 3)), ("diffuse", 3), ("reflection", 4)):
+        rows[:, place] = column(surfaces, name).reshape(rows[:, place].shape) if surfaces else 0
+    return rows
 
 
 def pixel_places(rows: Rows, width: int, top: int, pixel: Number) -> tuple[Number, Number]:

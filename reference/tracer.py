@@ -12,7 +12,7 @@ from reference.device import array_types
 from reference.draft import Draft, is_draftable
 from reference.errors import InputError
 from reference.model import DOCUMENT, Model
-from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
+from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene, extent
 from reference.tables import BAND
 from reference.world import View, World
 
@@ -69,11 +69,11 @@ def render_bands(
 
 def _artist(scene: Scene, model: Model, precision: str, device: str) -> World | Draft:
     """What draws the scene in the precision asked for."""
-    types = array_types(precision, device)
+    types, single = array_types(precision, device), array_types("single", device)
     _check_magnitudes(scene, precision)
-    world = World(scene, model, types)
-    drafted = precision == "auto" and is_draftable(world.scene, model)
-    return Draft(world, array_types("single", device)) if drafted else world
+    world = World(scene, model, types, single)
+    drafted = precision == "auto" and world.tree is None and is_draftable(world.scene, model)
+    return Draft(world, single) if drafted else world
 
 
 def check_request(width: int, height: int, depth: int) -> None:
@@ -87,7 +87,5 @@ def check_request(width: int, height: int, depth: int) -> None:
 def _check_magnitudes(scene: Scene, precision: str) -> None:
     """Raise InputError for coordinates so large that their squares would overflow unseen."""
     largest = LARGEST_NUMBER[precision]
-    coordinates = [value for s in scene.spheres for value in (*s.centre, s.radius)]
-    coordinates += [value for p in scene.planes for value in p.point]
-    if (found := max(map(abs, coordinates), default=0.0)) > largest:
+    if (found := extent(scene)) > largest:
         raise InputError(f"expected coordinates up to {largest:g} in {precision} precision, found {found:g}")
