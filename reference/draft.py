@@ -18,7 +18,7 @@ from reference.device import Types
 from reference.model import CONVENTIONS, Mask, Model, Number, Vector, mirrored
 from reference.scene import EYE, LIGHT, Plane, Scene, Sphere
 from reference.search import Search, Sight, blocked, is_clear, nearest
-from reference.tables import MATERIAL, NOTHING, Rows, State, materials
+from reference.tables import MATERIAL, NOTHING, Rows, State, shading
 from reference.world import View, World
 
 FAITHFUL = 0.009  # levels
@@ -44,9 +44,7 @@ class Draft:
         self.model, self.world, scene = world.model, world, world.scene
         self.search = Search(scene, single)
         surfaces: tuple[Sphere | Plane, ...] = (*scene.spheres, *scene.planes)
-        shades = [
-            (*m[:5], _brightness(m, scene), *_rounding(s)) for m, s in zip(materials(scene), surfaces, strict=True)
-        ]
+        shades = [(*m[:5], _brightness(m, scene), *_rounding(s)) for m, s in zip(shading(scene), surfaces, strict=True)]
         self.shades = Rows(single, len(scene.spheres), shades, MATERIAL)
         self.ambient = self.shades.Vector(*map(self.shades.uniform, scene.ambient))
         self.ambient_coefficient = self.shades.uniform(scene.ambient_coefficient)

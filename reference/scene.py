@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from itertools import chain
 from math import dist, hypot, isclose
 from pathlib import Path
 from typing import TypeVar
@@ -112,12 +111,6 @@ def merge_coincident(scene: Scene) -> Scene:
     for sphere in scene.spheres:
         spheres.setdefault((sphere.centre, sphere.radius), sphere)
     return replace(scene, spheres=tuple(spheres.values()), planes=tuple(distinct_planes(scene).values()))
-
-
-def extent(scene: Scene) -> float:
-    """The largest coordinate or radius, by magnitude."""
-    numbers = chain.from_iterable((*s.centre, s.radius) for s in scene.spheres)
-    return max(map(abs, chain(numbers, *(p.point for p in scene.planes))), default=0.0)
 
 
 def distinct_spheres(scene: Scene) -> dict[str, Sphere]:

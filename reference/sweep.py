@@ -17,7 +17,7 @@ from reference.balls import UNIT, Arrow, Ball, Mask, Number
 from reference.device import Types, array_types
 from reference.enclosure import HeldPlane, HeldSphere, Tables, precision
 from reference.scene import EYE, LIGHT, SCREEN, SCREEN_DISTANCE, Plane, Scene, Sphere, Triple, merge_coincident
-from reference.tables import BAND, MATERIAL, NOTHING, Rows, State, materials, pixel_places
+from reference.tables import BAND, MATERIAL, NOTHING, Rows, State, pixel_places, shading
 
 SMALLEST, LARGEST = 1e-30, 1e30  # of the scene's numbers, so that no product under- or overflows
 STRAIGHT = 2.0**-20  # the largest relative error of a direction, beyond which a ray gives up
@@ -72,8 +72,8 @@ class BallWorld(Rows):
             geometry = [_sphere_row(s) if isinstance(s, HeldSphere) else _plane_row(s) for s in tables.surfaces]
             ambient = [_nearest(value)[0] for value in tables.ambient]
         super().__init__(types, len(scene.spheres), geometry, WIDTH)
-        self.materials = Rows(types, len(scene.spheres), materials(scene), MATERIAL)
-        self.fading = all(abs(mirror) <= 1 for mirror in materials(scene)[:, 4])
+        self.materials = Rows(types, len(scene.spheres), shading(scene), MATERIAL)
+        self.fading = all(abs(mirror) <= 1 for mirror in shading(scene)[:, 4])
         self.ambient = self.Vector(*map(self.uniform, ambient))
         self.brightest = self.uniform(max(map(abs, ambient)))
         self.eye, self.light = self.held(EYE), self.held(LIGHT)

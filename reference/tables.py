@@ -7,6 +7,7 @@ values, one kernel for each pair of counts; beyond that it loops over the surfac
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import chain
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -118,19 +119,23 @@ def _pick(column: State, masks: list[Mask]) -> Number:
     return first
 
 
-def column(surfaces: Sequence[Sphere | Plane], name: str) -> NDArray[np.float64]:
-    """One property of all surfaces: surfaces x how many numbers it has."""
-    values = np.array(list(map(attrgetter(name), surfaces)), np.float64)
-    return values.reshape(len(surfaces), -1 if len(surfaces) else 1)
+def column(surfaces: Sequence[Sphere | Plane], name: str, width: int = 1) -> NDArray[np.float64]:
+    """One property of all surfaces, of `width` numbers: surfaces x width."""
+    values: Any = map(attrgetter(name), surfaces)
+    flat = chain.from_iterable(values) if width > 1 else values
+    return np.fromiter(flat, np.float64, len(surfaces) * width).reshape(-1, width)
 
 
-def materials(scene: Scene) -> NDArray[np.float64]:
+def geometry(scene: Scene) -> NDArray[np.float64]:
+    """Centre and radius of each sphere."""
+    return np.hstack([column(scene.spheres, "centre", 3), column(scene.spheres, "radius")])
+
+
+def shading(scene: Scene) -> NDArray[np.float64]:
     """A row of eight for each surface: its colour, diffuse and reflection coefficient, and zeros."""
     surfaces: tuple[Sphere | Plane, ...] = (*scene.spheres, *scene.planes)
-    rows = np.zeros((len(surfaces), MATERIAL))
-    for name, place in (("colour", slice(0, 3)), ("diffuse", 3), ("reflection", 4)):
-        rows[:, place] = column(surfaces, name).reshape(rows[:, place].shape) if surfaces else 0
-    return rows
+    rows = [column(surfaces, "colour", 3), column(surfaces, "diffuse"), column(surfaces, "reflection")]
+    return np.hstack([*rows, np.zeros((len(surfaces), 3))])
 
 
 def pixel_places(rows: Rows, width: int, top: int, pixel: Number) -> tuple[Number, Number]:

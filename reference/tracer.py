@@ -12,7 +12,7 @@ from reference.device import array_types
 from reference.draft import Draft, is_draftable
 from reference.errors import InputError
 from reference.model import DOCUMENT, Model
-from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene, extent
+from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
 from reference.tables import BAND
 from reference.world import View, World
 
@@ -70,7 +70,6 @@ def render_bands(
 def _artist(scene: Scene, model: Model, precision: str, device: str) -> World | Draft:
     """What draws the scene in the precision asked for."""
     types, single = array_types(precision, device), array_types("single", device)
-    _check_magnitudes(scene, precision)
     world = World(scene, model, types, single)
     drafted = precision == "auto" and world.tree is None and is_draftable(world.scene, model)
     return Draft(world, single) if drafted else world
@@ -82,10 +81,3 @@ def check_request(width: int, height: int, depth: int) -> None:
         raise InputError(f"expected a size of 1 to {LARGEST_SIDE} pixels a side, found {width}x{height}")
     if not 0 <= depth <= LARGEST_DEPTH:
         raise InputError(f"expected a depth of 0 to {LARGEST_DEPTH}, found {depth}")
-
-
-def _check_magnitudes(scene: Scene, precision: str) -> None:
-    """Raise InputError for coordinates so large that their squares would overflow unseen."""
-    largest = LARGEST_NUMBER[precision]
-    if (found := extent(scene)) > largest:
-        raise InputError(f"expected coordinates up to {largest:g} in {precision} precision, found {found:g}")

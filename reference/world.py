@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import drjit as dr
 import numpy as np
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from reference.acceleration import ROUNDING, Tree
 from reference.device import Types
+from reference.errors import InputError
 from reference.intersection import Ray, blocked, nearest
 from reference.model import Model, Number, Vector, is_convention
-from reference.scene import EYE, LIGHT, SCREEN, Scene, extent, holds_light
-from reference.tables import MATERIAL, NOTHING, UNROLLED, Path, Rows, column, materials, pixel_places
+from reference.scene import EYE, LIGHT, SCREEN, Scene, holds_light
+from reference.tables import MATERIAL, NOTHING, UNROLLED, Path, Rows, column, geometry, pixel_places, shading
 
-WIDTH = 8  # numbers in a row of geometry
 FARTHER = 1 + 2.0**-20  # so that a rounded distance is no nearer
-LARGEST_TREE = 1e12  # of a coordinate, which single precision must square
+LARGEST = {"double": 1e100, "single": 1e12}  # of a coordinate: products of several must stay finite
 
 
 @dataclass(frozen=True)
@@ -31,20 +31,29 @@ class View:
 
 
 class World(Rows):
-    """A scene on the device and the model that reads it."""
+    """A scene on the device and the model that reads it.
+
+    A sphere's row: centre, radius, whether the light lies on it, when it is listed. A plane's: point, unit normal, and
+    last how far it is from the light along that.
+    """
 
     def __init__(self, scene: Scene, model: Model, types: Types, single: Types) -> None:
         scene = model.surfaces(scene)
-        tree, order = None, np.arange(len(scene.spheres))
-        if len(scene.spheres) + len(scene.planes) > UNROLLED and is_convention(model) and extent(scene) < LARGEST_TREE:
-            tree = Tree(single, column(scene.spheres, "centre"), column(scene.spheres, "radius").ravel())
+        spheres, materials = geometry(scene), shading(scene)
+        _check_magnitudes(scene, spheres, types)
+        tree, order = None, np.arange(len(spheres))
+        if len(materials) > UNROLLED and is_convention(model) and np.abs(spheres).max(initial=0) < LARGEST["single"]:
+            tree = Tree(single, spheres[:, :3], spheres[:, 3])
             order = tree.order
-            scene = replace(scene, spheres=tuple(map(scene.spheres.__getitem__, order)))
         self.model, self.scene = model, scene
-        spheres, planes = _sphere_rows(scene, order), _plane_rows(scene)
-        self.light_on_sphere = bool(spheres[:, 4].any())
-        super().__init__(types, len(spheres), np.concatenate([spheres, planes]), WIDTH, tree)
-        self.materials = Rows(types, len(spheres), materials(scene), MATERIAL)
+        lit = _lit(scene, spheres)
+        self.light_on_sphere = bool(lit.any())
+        planes = [(*p.point, 0, *p.unit_normal, p.distance_from(LIGHT)) for p in scene.planes]
+        rows = np.zeros((len(materials), 8))
+        rows[: len(order), :6] = np.column_stack([spheres[order], lit[order], order])
+        rows[len(order) :] = planes or 0
+        super().__init__(types, len(order), rows, 8, tree)
+        self.materials = Rows(types, len(order), np.concatenate([materials[order], materials[len(order) :]]), MATERIAL)
         self.ambient = self.Vector(*map(self.uniform, scene.ambient))
         self.ambient_coefficient = self.uniform(scene.ambient_coefficient)
         self.light = self.Vector(*LIGHT)
@@ -73,21 +82,20 @@ class World(Rows):
         return self.Vector(*self.model.camera_direction(*pixel_places(self, view.width, top, pixel), *size))
 
 
-def _sphere_rows(scene: Scene, order: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Centre, radius, whether the light lies on the sphere, and when it is listed."""
-    rows = np.zeros((len(scene.spheres), WIDTH))
-    if len(rows):
-        rows[:, :3], rows[:, 3:4] = column(scene.spheres, "centre"), column(scene.spheres, "radius")
-        near = np.isclose(np.linalg.norm(rows[:, :3] - LIGHT, axis=1), rows[:, 3])
-        for place in np.flatnonzero(near):
-            rows[place, 4] = holds_light(scene.spheres[place])
-        rows[:, 5] = order
-    return rows
+def _check_magnitudes(scene: Scene, spheres: NDArray[np.float64], types: Types) -> None:
+    """Raise InputError for coordinates so large that their squares would overflow unseen."""
+    precision = "double" if types.Float is types.Double else "single"
+    numbers = np.append(spheres, column(scene.planes, "point", 3))
+    if (found := np.abs(numbers).max(initial=0)) > LARGEST[precision]:
+        raise InputError(f"expected coordinates up to {LARGEST[precision]:g} in {precision} precision, found {found:g}")
 
 
-def _plane_rows(scene: Scene) -> NDArray[np.float64]:
-    """Point, unit normal, how far the plane is from the light along it."""
-    return np.array([(*p.point, 0, *p.unit_normal, p.distance_from(LIGHT)) for p in scene.planes]).reshape(-1, WIDTH)
+def _lit(scene: Scene, spheres: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """On which spheres the light lies."""
+    lit: NDArray[np.bool_] = np.isclose(np.linalg.norm(spheres[:, :3] - LIGHT, axis=1), spheres[:, 3])
+    for place in np.flatnonzero(lit):
+        lit[place] = holds_light(scene.spheres[place])
+    return lit
 
 
 @dr.syntax
