@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from reference.device import DEVICES, PRECISIONS
 from reference.errors import CrossrayError, FailureError, InputError, SceneWarning, plain
 from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
 
@@ -122,8 +123,8 @@ def app() -> None:
 @size_option
 @depth_option
 @click.option("--convention", type=CONVENTIONS, default="document", help="Which reading of the assignment.")
-@click.option("--precision", type=click.Choice(["double", "single"]), default="double", help="What to compute in.")
-@click.option("--device", type=click.Choice(["auto", "cpu", "gpu"]), default="auto", help="Where to compute.")
+@click.option("--precision", type=click.Choice(PRECISIONS), default="auto", help="Of the computation; auto: as double.")
+@click.option("--device", type=click.Choice(DEVICES), default="auto", help="Where to compute.")
 @click.option("--show", is_flag=True, help="Show the picture in a window.")
 @click.option("--time", is_flag=True, help="Trace a few times more and print how long that takes.")
 @quiet_option

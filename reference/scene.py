@@ -96,7 +96,7 @@ class Scene:
         from reference.image import show_window, write_image
         from reference.tracer import render
 
-        levels = render(self, dtype=float)
+        levels = render(self)
         write_image(Path("scene.jpg"), levels)
         if show:
             show_window(levels)

@@ -30,15 +30,18 @@ def render(
     width: int = 1000,
     height: int = 1000,
     depth: int = 3,
-    precision: str = "double",
+    precision: str = "auto",
     device: str = "auto",
     dtype: DTypeLike = np.float32,
 ) -> NDArray[Any]:
     """The picture: height x width x 3, linear, in levels (0..255) that are not clamped, of type `dtype`.
 
-    `depth` counts the bounces after the primary hit; `precision` is that of the computation (double or single).
+    `depth` counts the bounces after the primary hit; `precision` is that of the computation: double, single, or auto,
+    which gives the picture of double precision, within 0.01 level (the same for a `dtype` of double precision).
     Raises InputError for a size or depth out of range and DeviceError where Dr.Jit cannot compute.
     """
+    if precision == "auto" and np.dtype(dtype) == np.float64:
+        precision = "double"
     picture = np.empty((height, width, 3), dtype)
     top = 0
     for band in render_bands(scene, model, width=width, height=height, depth=depth, precision=precision, device=device):
@@ -54,7 +57,7 @@ def render_bands(
     width: int = 1000,
     height: int = 1000,
     depth: int = 3,
-    precision: str = "double",
+    precision: str = "auto",
     device: str = "auto",
 ) -> Iterator[NDArray[Any]]:
     """The picture of `render` from top to bottom, some rows at a time: rows x width x 3."""

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -13,12 +14,12 @@ import pytest
 import transcription
 
 import reference
-from reference import device, tables, tracer
+from reference import device, tables, tracer, world
 from reference.errors import DeviceError, InputError
 from reference.explanation import explain
 from reference.image import quantise, read_image
 from reference.model import CONVENTIONS, DOCUMENT, EXACT, PUBLISHED, Model
-from reference.scene import Plane, Scene, Sphere, Triple
+from reference.scene import Plane, Scene, Sphere, Triple, holds_light
 from reference.text import dump, parse
 from reference.tracer import render
 
@@ -107,18 +108,19 @@ def test_many_spheres_agree_with_the_transcription() -> None:
     assert worst(render(scene, width=60, height=60, dtype=float), expected) <= 1e-6
 
 
-def kernels(*scenes: Scene) -> set[str]:
+def kernels(*scenes: Scene, precision: str = "double") -> set[str]:
     """The kernels that drew these scenes, by the hash of their code."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
         for scene in scenes:
-            render(scene, width=32, height=32)
+            render(scene, width=32, height=32, precision=precision)
         return {entry["hash"] for entry in dr.kernel_history() if entry["type"] == dr.KernelType.JIT}
 
 
 def test_other_numbers_need_no_other_kernel() -> None:
     first, second = (Scene.load(SCENES / f"example{number}.txt") for number in (1, 2))
     assert kernels(first) == kernels(second)
+    assert kernels(first, precision="auto") == kernels(second, precision="auto")
     assert kernels(random_scene(4, seed=1)) == kernels(*(random_scene(4, seed=seed) for seed in range(2, 6)))
 
 
@@ -280,3 +282,45 @@ def test_a_camera_ray_along_a_plane_misses_it() -> None:
 def test_coordinates_too_large_to_square() -> None:
     with pytest.raises(InputError, match=r"coordinates up to 1e\+100 in double precision, found 1e\+200"):
         render(Scene((0, 0, 0), 0, (Sphere((1, 1, 1), (0, 0, 1e200), 1, 1, 0),)))
+
+
+def without_tree(scene: Scene, monkeypatch: pytest.MonkeyPatch, *, size: int, **options: Any) -> np.ndarray:
+    """The picture by the loop over all surfaces."""
+    with monkeypatch.context() as patch:
+        patch.setattr(world, "is_convention", lambda model: False)
+        return render(scene, width=size, height=size, dtype=float, **options)
+
+
+@pytest.mark.parametrize("model", CONVENTIONS.values(), ids=CONVENTIONS)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_tree_draws_what_the_loop_draws(model: Model, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit: the eye among the spheres, spheres around the light, some behind the eye, some coincident."""
+    scene = random_scene(90, seed)
+    pick = random.Random(seed)
+    around = [
+        replace(ball, centre=(pick.gauss(0, 60), pick.gauss(0, 60), pick.gauss(40, 60))) for ball in scene.spheres
+    ]
+    lights = (Sphere((9, 9, 200), (500, 500, 500), 40, 1, 0.5), Sphere((90, 9, 20), (480, 520, 500), 20, 1, 0.5))
+    scene = replace(scene, spheres=(*scene.spheres, *around[:20], *around[:3], *lights))
+    drawn = render(scene, model, width=90, height=90, depth=4, dtype=float)
+    assert np.array_equal(drawn, without_tree(scene, monkeypatch, model=model, size=90, depth=4))
+    assert len(np.unique(drawn)) > 1000
+
+
+def test_the_tree_keeps_to_the_scenes_order_in_a_tie() -> None:
+    """Two spheres that mirror each other are equally far all along the plane between them."""
+    left = Sphere((250, 0, 0), (-20, 0, 300), 40, 1, 0)
+    right = replace(left, colour=(0, 250, 0), centre=(20, 0, 300))
+    small = tuple(Sphere((0, 0, 9), (10.0 * place, 90, 400), 3, 1, 0) for place in range(-20, 20))
+    for spheres in ((left, right), (right, left)):
+        for before in (0, 20, 40):
+            scene = Scene((255, 255, 255), 1, (*small[:before], *spheres, *small[before:]))
+            between = render(scene, width=101, height=101, dtype=float)[40:60, 50]
+            assert np.all(between.argmax(axis=1) == np.argmax(spheres[0].colour))
+
+
+def test_light_on_one_of_many_spheres(monkeypatch: pytest.MonkeyPatch) -> None:
+    ball = Sphere((200, 100, 50), (500, 500, 440), 60, 1, 0.3)
+    scene = replace(random_scene(60, seed=4), spheres=(*random_scene(60, seed=4).spheres, ball))
+    assert holds_light(ball)
+    assert np.array_equal(render(scene, width=80, height=80, dtype=float), without_tree(scene, monkeypatch, size=80))

@@ -19,5 +19,5 @@ def export(scene: Scene, settings: Settings) -> Export:
     """The scene file itself and the command that draws it by the `exact` convention, in double precision."""
     size = f"{settings.width}x{settings.height}"
     command = (PYTHON, "-m", "crossray", "render", "scene.txt", "-o", "scene.exr")
-    options = ("--size", size, "--depth", str(settings.depth), "--convention", "exact", "--time")
-    return Export({"scene.txt": dump(scene)}, command + options, "scene.exr", limits=LIMITS)
+    options = ("--size", size, "--depth", str(settings.depth), "--convention", "exact", "--precision", "double")
+    return Export({"scene.txt": dump(scene)}, (*command, *options, "--time"), "scene.exr", limits=LIMITS)
