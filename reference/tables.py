@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 UNROLLED = 16  # surfaces; beyond this, compile time outweighs what straight code gains
 BAND = 1 << 22  # pixels a kernel launch, which bounds the memory of large pictures
 MATERIAL = 8  # numbers in a row of materials
+TILE = 4  # pixels a side
 FEW = 4096  # numbers that are quicker handed over one by one
 NOTHING = 0xFFFFFFFF  # the index of no surface
 
@@ -140,7 +141,28 @@ def shading(scene: Scene) -> NDArray[np.float64]:
 
 def pixel_places(rows: Rows, width: int, top: int, pixel: Number) -> tuple[Number, Number]:
     """Column and row of pixels that are counted from the start of row `top`."""
-    # Processors divide integers one by one; the middle of a pixel is too far from a whole row for rounding to matter.
-    row = rows.Index((rows.Double(pixel) + 0.5) * dr.opaque(rows.Double, 1 / width))
+    row = _divided(rows, pixel, width)
     column = pixel - row * dr.opaque(rows.Index, width)
     return rows.Float(column), rows.Float(row + dr.opaque(rows.Index, top))
+
+
+def tiles(rows: Rows, width: int, count: int) -> tuple[Number, Number]:
+    """The pixels of `count` rows tile by tile, since rays that run together should follow each other; and for each
+    pixel, row by row, its place among those. Beside the last column and below the last row tiles hold other pixels."""
+    across, down = -(-width // TILE), -(-count // TILE)
+    place = dr.arange(rows.Index, across * down * TILE * TILE)
+    tile, inner = place // (TILE * TILE), place % (TILE * TILE)
+    below = _divided(rows, tile, across)
+    column = TILE * (tile - below * dr.opaque(rows.Index, across)) + inner % TILE
+    pixel = (TILE * below + inner // TILE) * dr.opaque(rows.Index, width) + column
+
+    each = dr.arange(rows.Index, count * width)
+    row = _divided(rows, each, width)
+    column = each - row * dr.opaque(rows.Index, width)
+    tile = row // TILE * dr.opaque(rows.Index, across) + column // TILE
+    return pixel, (tile * TILE + row % TILE) * TILE + column % TILE
+
+
+def _divided(rows: Rows, numbers: Number, divisor: int) -> Number:
+    """The whole part of a quotient. Processors divide integers one by one; half a unit is more than rounding loses."""
+    return rows.Index((rows.Double(numbers) + 0.5) * dr.opaque(rows.Double, 1 / divisor))

@@ -15,7 +15,7 @@ from reference.errors import InputError
 from reference.intersection import Ray, blocked, nearest
 from reference.model import Model, Number, Vector, is_convention
 from reference.scene import EYE, LIGHT, SCREEN, Scene, holds_light
-from reference.tables import MATERIAL, NOTHING, UNROLLED, Path, Rows, column, geometry, pixel_places, shading
+from reference.tables import MATERIAL, NOTHING, UNROLLED, Path, Rows, column, geometry, pixel_places, shading, tiles
 
 FARTHER = 1 + 2.0**-20  # so that a rounded distance is no nearer
 LARGEST = {"double": 1e100, "single": 1e12}  # of a coordinate: products of several must stay finite
@@ -69,12 +69,21 @@ class World(Rows):
 
     def draw(self, view: View, top: int, count: int) -> Number:
         """Red, green and blue of each pixel in turn, in `count` rows from `top` on."""
-        return self.colours(view, top, dr.arange(self.Index, count * view.width))
+        if self.tree is None:
+            return self.colours(view, top, dr.arange(self.Index, count * view.width))
+        pixel, place = tiles(self, view.width, count)
+        colour = self.radiance(view, top, pixel) + dr.zeros(self.Vector, dr.width(pixel))
+        dr.eval(colour)
+        return dr.ravel(dr.gather(self.Vector, colour, place))
 
     def colours(self, view: View, top: int, pixel: Number) -> Number:
         """Red, green and blue of some pixels in turn, which are counted from the start of row `top`."""
-        colour = _radiance(self, self.directions(view, top, pixel), dr.opaque(self.Index, view.depth))
+        colour = self.radiance(view, top, pixel)
         return dr.ravel(colour + dr.zeros(self.Vector, dr.width(pixel)))  # one for each, be they all the same
+
+    def radiance(self, view: View, top: int, pixel: Number) -> Vector:
+        """The colours of some pixels, which are counted from the start of row `top`."""
+        return _radiance(self, self.directions(view, top, pixel), dr.opaque(self.Index, view.depth))
 
     def directions(self, view: View, top: int, pixel: Number) -> Vector:
         """Directions of the camera's rays, not of unit length."""
