@@ -24,7 +24,7 @@ from reference.tables import State, upload
 
 Number = Any  # a Dr.Jit array
 
-LEAF = 4  # spheres in a leaf, at most; a kernel has as many copies of the step
+LEAF = 4  # spheres in a leaf, at most
 BOXES = 3  # packets of four numbers in a node: its children's boxes, each two corners
 SAMPLE = 64  # spheres that tell a node's longest side
 FLATTEST = 1e-18  # component of a direction, so that its reciprocal and products with that stay finite
@@ -32,7 +32,7 @@ ROUNDING = 2.0**-20  # of a coordinate, several times what the test of a box can
 
 
 class Tree:
-    """Spheres sorted into a tree: `order` lists their numbers as the tree holds them, `size` to a leaf.
+    """Spheres sorted into a tree: `order` lists their numbers as the tree holds them, leaf by leaf.
 
     `types` are those of single precision. `centres` (n x 3) and `radii` (n, above 0) are float64, of a size that
     float32 can hold. Places in `order` are what `fold` speaks of; tables that follow it are read where rays are.
@@ -40,11 +40,12 @@ class Tree:
 
     def __init__(self, types: Types, centres: NDArray[np.float64], radii: NDArray[np.float64]) -> None:
         self.types = types
-        leaves = sort(centres)
-        self.order: NDArray[np.intp] = leaves.ravel()
-        self.size = leaves.shape[1]
-        inside = np.column_stack([centres, radii])[leaves]
-        self.spheres = upload(types.Float, inside.astype(np.float32))
+        leaves, counts = sort(centres)
+        self.order: NDArray[np.intp] = leaves[counts]
+        spheres = np.column_stack([centres, radii])
+        self.spheres = upload(types.Float, spheres[self.order].astype(np.float32))
+        self.ends = upload(types.Index, np.append(0, np.cumsum(counts.sum(axis=1))).astype(np.uint32))
+        inside = spheres[leaves]
         low = (inside[..., :3] - inside[..., 3:]).min(axis=1, initial=np.inf)
         high = (inside[..., :3] + inside[..., 3:]).max(axis=1, initial=-np.inf)
         nodes = boxes(low, high)
@@ -66,8 +67,7 @@ class Tree:
 
         The ray is float32: `origin` and `direction` (of any length, not 0), and `margin`, how far its points and the
         spheres may be off. Nothing beyond t = `reach(*state)` is sought, and nothing when not `going(*state)`.
-        `place` is the sphere's in `order`; `sphere` its float32 centre and radius. Spheres are visited
-        once or never; but for those that are twice in `order`, since all leaves are full.
+        `place` is the sphere's in `order`; `sphere` its float32 centre and radius. A sphere is visited once or never.
         """
         number, index, packet = self.types.Float, self.types.Index, self.types.Vector4
         inverse = [dr.rcp(dr.select(dr.abs(d) < FLATTEST, dr.copysign(number(FLATTEST), d), d)) for d in direction]
@@ -111,9 +111,13 @@ class Tree:
 
         def visit(node: Number, pending: Number, *state: Number) -> State:
             """All spheres of a leaf."""
-            for place in range(self.size):
-                at = (node - self.leaves) * self.size + place
-                state = step(at, list(dr.gather(packet, self.spheres, at)), *state)
+            leaf = node - self.leaves
+            place, end = dr.gather(index, self.ends, leaf), dr.gather(index, self.ends, leaf + 1)
+
+            def meet_sphere(place: Number, *state: Number) -> State:
+                return (place + 1, *step(place, dr.gather(packet, self.spheres, place), *state))
+
+            _, *state = dr.while_loop((place, *state), lambda place, *_: place < end, meet_sphere)
             node, pending = climb(node, pending)
             return (dr.select(going(*state), node, 0), pending, *state)
 
@@ -136,10 +140,10 @@ def _larger(a: Number, b: Number) -> Number:
     return dr.select(a > b, a, b)
 
 
-def sort(centres: NDArray[np.float64]) -> NDArray[np.intp]:
-    """The numbers of the spheres in each leaf, leaves x spheres in a leaf.
+def sort(centres: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """The numbers of the spheres in each leaf, leaves x spheres in a leaf, and which of them count.
 
-    All leaves have as many, so some spheres, evenly chosen, are there twice.
+    All leaves have as many, so some spheres, evenly chosen, are there twice and count once.
     """
     count, levels = len(centres), 0
     while count > LEAF << levels:
@@ -160,7 +164,7 @@ def sort(centres: NDArray[np.float64]) -> NDArray[np.intp]:
         keys.partition(keys.shape[1] // 2, axis=1)
         places = (keys.ravel() & np.uint64(0xFFFFFFFF)).astype(np.intp)
         slots, points = slots[places], np.take(points, places, axis=1)
-    return sphere[slots].reshape(leaves, size)
+    return sphere[slots].reshape(leaves, size), ~twice[slots].reshape(leaves, size)
 
 
 def boxes(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float32]:

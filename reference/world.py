@@ -42,23 +42,18 @@ class World(Rows):
         spheres, materials = geometry(scene), shading(scene)
         _check_magnitudes(scene, spheres, types)
         tree, order = None, np.arange(len(spheres))
-        if (
-            len(materials) > UNROLLED
-            and len(spheres)
-            and is_convention(model)
-            and np.abs(spheres).max(initial=0) < LARGEST["single"]
-        ):
+        if len(materials) > UNROLLED and is_convention(model) and np.abs(spheres).max(initial=0) < LARGEST["single"]:
             tree = Tree(single, spheres[:, :3], spheres[:, 3])
             order = tree.order
         self.model, self.scene = model, scene
         lit = _lit(scene, spheres)
         self.light_on_sphere = bool(lit.any())
         planes = [(*p.point, 0, *p.unit_normal, p.distance_from(LIGHT)) for p in scene.planes]
-        rows = np.zeros((len(order) + len(planes), 8))
+        rows = np.zeros((len(materials), 8))
         rows[: len(order), :6] = np.column_stack([spheres[order], lit[order], order])
         rows[len(order) :] = planes or 0
         super().__init__(types, len(order), rows, 8, tree)
-        self.materials = Rows(types, len(order), np.concatenate([materials[order], materials[len(lit) :]]), MATERIAL)
+        self.materials = Rows(types, len(order), np.concatenate([materials[order], materials[len(order) :]]), MATERIAL)
         self.ambient = self.Vector(*map(self.uniform, scene.ambient))
         self.ambient_coefficient = self.uniform(scene.ambient_coefficient)
         self.light = self.Vector(*LIGHT)
