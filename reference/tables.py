@@ -148,7 +148,8 @@ def pixel_places(rows: Rows, width: int, top: int, pixel: Number) -> tuple[Numbe
 
 def tiles(rows: Rows, width: int, count: int) -> tuple[Number, Number]:
     """The pixels of `count` rows tile by tile, since rays that run together should follow each other; and for each
-    pixel, row by row, its place among those. Beside the last column and below the last row tiles hold other pixels."""
+    pixel, row by row, its place among those. Beside the last column and below the last row tiles hold other pixels.
+    """
     across, down = -(-width // TILE), -(-count // TILE)
     place = dr.arange(rows.Index, across * down * TILE * TILE)
     tile, inner = place // (TILE * TILE), place % (TILE * TILE)
