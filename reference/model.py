@@ -61,13 +61,12 @@ def pixel_direction(column: Number, row: Number, across: Number, down: Number) -
 def sphere_distances(p: Vector, d: Vector, dd: Number, radius: Number, leaving: Mask) -> tuple[Number, Number]:
     """Roots of d.d t^2 + 2 p.d t + p.p - r^2, p = origin - centre; NaN for a miss.
 
-    A quarter of the discriminant is d.d (r^2 - l.l), l the way from the centre to the ray, which loses fewer digits.
     A ray that starts on the sphere has p.p = r^2, so that its roots are exactly 0 and -2 p.d / d.d.
     """
-    half, scale = dr.dot(p, d), dr.rcp(dd)
-    way = dr.fma(d, -half * scale, p)
-    depth = dr.fma(radius, radius, -dr.dot(way, way))
-    root = dr.sqrt(dr.select(leaving, half * half, dd * depth))
+    half = dr.dot(p, d)
+    constant = dr.select(leaving, 0, dr.fma(-radius, radius, dr.dot(p, p)))
+    root = dr.sqrt(dr.fma(half, half, -dd * constant))
+    scale = dr.rcp(dd)
     return (-half - root) * scale, (root - half) * scale
 
 
