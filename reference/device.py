@@ -94,9 +94,10 @@ def find_llvm() -> Path | None:
 def _check_llvm() -> None:
     """Try an LLVM that is not ours in a child process: a bad one aborts the whole process it runs in."""
     chosen = os.environ.get(LLVM_VARIABLE)
-    if chosen and chosen == str(find_llvm()):
-        return
     if chosen in _tried:
+        return
+    if chosen and chosen == str(find_llvm()):
+        _tried.add(chosen)
         return
     import subprocess
 

@@ -5,36 +5,48 @@ pixel whose rays may meet other surfaces, or whose colour may be off by more tha
 
 A ray that passes e beside its way meets a surface, under the cosine c, at most 2 e / c off: more than e / c, since a
 sphere of radius r curves away, but no more than that while 8 e < r c^2. The normal is off by that over r, the mirrored
-ray is turned by up to four times as much, and a cosine is off by no more than the normal and the direction to the light.
+ray is turned by up to four times as much. A cosine is off by no more than the normal, and than a shift s and a point
+at distance n from the surface turn the direction to the light, at distance l: cos s / l + n / l to first order.
 """
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import drjit as dr
 
 from reference.device import Types
-from reference.model import CONVENTIONS, Mask, Model, Number, Vector, mirrored
-from reference.scene import EYE, LIGHT, Plane, Scene, Sphere
-from reference.search import Search, Sight, blocked, is_clear, nearest
-from reference.tables import MATERIAL, NOTHING, Rows, State, shading
+from reference.model import Mask, Model, Number, Vector, is_convention, mirrored
+from reference.scene import LIGHT, Plane, Scene, Sphere
+from reference.search import (
+    CAMERA_TURN,
+    GRAZED,
+    ROUNDING,
+    ROUNDOFF,
+    Search,
+    Sight,
+    blocked,
+    distance,
+    is_clear,
+    nearest,
+    seen,
+)
+from reference.tables import NOTHING, Rows, State
 from reference.world import View, World
 
 FAITHFUL = 0.009  # levels
 CERTAIN = 1 + 2.0**-20  # farther by that is farther, whatever distances lose in single precision
-FREE = {"name", "summary", "camera_direction"}  # what a model may change without touching the proofs
+BRIGHTEST = 1e30  # levels
 STEADY = 2.0**-12  # radians; a ray that may be turned by more is given up
-GRAZED = 1.1e-3  # |d.n| up to which some convention misses a plane
-ROUNDOFF = 2.0**-24
 
 
 def is_draftable(scene: Scene, model: Model) -> bool:
-    """Whether the proofs are about this model, a convention, and this scene, with nothing before the screen."""
-    steps = [field.name for field in fields(Model) if field.name not in FREE]
-    return is_clear(scene) and any(
-        all(getattr(model, step) is getattr(known, step) for step in steps) for known in CONVENTIONS.values()
-    )
+    """Whether the proofs are about this model, a convention, and this scene: see `is_clear`.
+
+    Nothing may be so bright that it is seen by way of mirrors whose coefficients multiply to less than can be told from
+    zero in single precision.
+    """
+    surfaces: list[Sphere | Plane] = [*scene.spheres, *scene.planes]
+    brightest = max((_brightness(surface, _ambient(scene)) for surface in surfaces), default=0.0)
+    return brightest < BRIGHTEST and is_clear(scene) and is_convention(model)
 
 
 class Draft:
@@ -43,11 +55,14 @@ class Draft:
     def __init__(self, world: World, single: Types) -> None:
         self.model, self.world, scene = world.model, world, world.scene
         self.search = Search(scene, single)
+        ambient = _ambient(scene)
         surfaces: tuple[Sphere | Plane, ...] = (*scene.spheres, *scene.planes)
-        shades = [(*m[:5], _brightness(m, scene), *_rounding(s)) for m, s in zip(shading(scene), surfaces, strict=True)]
-        self.shades = Rows(single, len(scene.spheres), shades, MATERIAL)
-        self.ambient = self.shades.Vector(*map(self.shades.uniform, scene.ambient))
-        self.ambient_coefficient = self.shades.uniform(scene.ambient_coefficient)
+        self.shades = Rows(single, len(scene.spheres), [_shade_row(s, ambient) for s in surfaces], 8)
+        self.ambient = self.shades.Vector(*map(self.shades.uniform, ambient))
+        skew = any(isinstance(s, Plane) and s.unit_normal.count(0) < 2 for s in surfaces)
+        self.slack = self.shades.uniform((9 if skew else 1.25) * ROUNDOFF)
+        self.camera_slack = self.shades.uniform((9 if skew else 0.75) * ROUNDOFF)
+        self.bend = self.shades.uniform(12 * ROUNDOFF if skew else 0)
         self.light = self.search.Vector(*LIGHT)
 
     def draw(self, view: View, top: int, count: int) -> Number:
@@ -55,133 +70,148 @@ class Draft:
         kind = self.search.Index
         pixel = dr.arange(kind, count * view.width)
         colour, doubt = radiance(self, self.world.directions(view, top, pixel), dr.opaque(kind, view.depth))
-        picture = dr.ravel(colour + dr.zeros(self.search.Vector, count * view.width))
+        picture = dr.ravel(colour + dr.zeros(self.search.Vector, len(pixel)))  # be they all the same
         dr.eval(picture, doubt)
         again = dr.compress(doubt)
         if len(again):
-            right = self.search.Float(self.world.colours(view, top, again))
+            right = self.search.Float(dr.ravel(self.world.colours(view, top, again)))
             place = dr.arange(kind, 3 * len(again))
             dr.scatter(picture, right, 3 * dr.gather(kind, again, place // 3) + place % 3)
         return picture
 
 
-def _brightness(material: State, scene: Scene) -> float:
-    """The most that a surface may send out at once."""
-    red, green, blue, diffuse, *_ = map(abs, material)
-    ambient = max(map(abs, scene.ambient)) * abs(scene.ambient_coefficient) / 256
-    return float(max(red, green, blue) * (diffuse + ambient))
+def _shade_row(surface: Sphere | Plane, ambient: list[float]) -> State:
+    """Colour, diffuse and reflection coefficient, the most sent out at once.
 
-
-def _rounding(surface: Sphere | Plane) -> tuple[float, float]:
-    """Share of the coordinates that rounding may move a hit, and how far it may turn a mirrored ray.
-
-    Less for a plane across an axis, where d.n is one coordinate of d, and the mirrored ray has its sign changed.
+    All planes have the light on the eye's side, as `is_clear` says: those whose normal points away are not lit.
     """
-    if isinstance(surface, Plane) and surface.unit_normal.count(0) == 2:
-        return 1.25 * ROUNDOFF, 0
-    return (9 if isinstance(surface, Plane) else 1.25) * ROUNDOFF, 8 * ROUNDOFF
+    away = isinstance(surface, Plane) and distance(surface, LIGHT) >= 0
+    return (*surface.colour, 0 if away else surface.diffuse, surface.reflection, _brightness(surface, ambient), 0, 0)
+
+
+def _ambient(scene: Scene) -> list[float]:
+    """Ambient light by channel, as a share of a surface's colour."""
+    return [value * scene.ambient_coefficient / 256 for value in scene.ambient]
+
+
+def _brightness(surface: Sphere | Plane, ambient: list[float]) -> float:
+    """The most that a surface may send out at once."""
+    return max(map(abs, surface.colour)) * (abs(surface.diffuse) + max(map(abs, ambient)))
 
 
 class Landing:
-    """Where rays meet a surface. The point may be off by `shift` and the normal by `tilt`; a ray mirrored there passes
-    up to `off` beside the true one, and is turned by up to `turn`.
+    """Where rays of direction d meet a surface at t, which may be `shift` off, and `onto` beside the surface. Rays
+    mirrored there pass up to `off` beside the true ones and are turned by up to `turn`.
+
+    A ray that is mirrored by a plane passes as far beside the true one as before, one mirrored by a sphere up to 3.5
+    times as far.
     """
 
-    def __init__(
-        self, hit: Number, point: Vector, normal: Vector, errors: tuple[Number, Number, Number, Number], doubt: Mask
-    ) -> None:
-        self.hit, self.point, self.normal, self.doubt = hit, point, normal, doubt
-        self.shift, self.tilt, self.off, self.turn = errors
+    def __init__(self, draft: Draft, hit: Number, met: tuple[Number, Vector, Vector, Number], d: Vector) -> None:
+        self.hit, (self.t, self.point, self.normal, self.curvature) = hit, met
+        self.is_sphere = hit < draft.search.first_plane
+        self.direction, self.slope = mirrored(d, self.normal), -dr.dot(d, self.normal)
+        self.far = dr.abs(self.point.x) + dr.abs(self.point.y) + dr.abs(self.point.z)
+        self.scale = self.far + draft.search.size
+        self.spread = dr.select(self.is_sphere, 3.5, 1)
+        self.bend = dr.select(self.is_sphere, 12 * ROUNDOFF, draft.bend)
+
+    def bound(self, aside: Number, onto: Number, turn: Number, rival: Number) -> None:
+        """The errors of rays that pass up to `aside` beside their way and are turned by up to `turn`."""
+        self.onto, self.shift = onto, dr.fma(aside, dr.rcp(self.slope), onto)
+        self.off = dr.fma(2 * onto, self.slope, self.spread * aside)
+        self.turn = dr.fma(2 * self.curvature, self.shift + onto, turn + self.bend)
+        clear = ((self.t + self.shift) * CERTAIN < rival) & (turn < STEADY)
+        clear &= dr.fma(8 * aside, self.curvature, GRAZED * GRAZED) < self.slope * self.slope
+        self.doubt = ~clear
 
 
 @dr.syntax
 def radiance(draft: Draft, camera: Vector, limit: Number) -> tuple[Vector, Mask]:
     """The colour that each camera ray brings back, and which pixels are in doubt."""
     search = draft.search
-    direction = search.Vector(camera)
-    direction *= dr.rcp(dr.norm(direction))
-    seen = _look(draft, camera, direction)
-    colour, error, open_, mirror, bend = _shade(draft, seen, search.Float(0))
-    doubt = seen.doubt | open_
+    rounding = dr.fma(search.Float(limit), 2, 18) * ROUNDOFF
+    first = _look(draft, camera)
+    lit = first.hit != NOTHING
+    colour, error, reflection = _shade(draft, first, rounding)
+    error = dr.select(lit, error, 0)
     depth = search.Index(1)
-    weight = draft.model.reflected_weight(search.Float(1), mirror, depth)
-    origin = draft.model.reflected_origin(seen.point, seen.normal)
-    direction = mirrored(direction, seen.normal)
-    leaving = search.Index(seen.hit)
-    off, turn, shift = seen.off, seen.turn + bend, seen.shift
-    while (leaving != NOTHING) & (depth <= limit) & (weight != 0) & ~doubt:
-        met = _follow(draft, Sight(origin, direction, off, turn, shift, leaving))
-        local, loss, open_met, mirror_met, bend_met = _shade(draft, met, search.Float(depth))
+    weight = dr.select(lit, draft.model.reflected_weight(search.Float(1), reflection, depth), 0)
+    colour = dr.select(lit, colour, 0)
+    origin = draft.model.reflected_origin(first.point, first.normal)
+    direction, off, turn, shift, scale = search.Vector(first.direction), first.off, first.turn, first.shift, first.scale
+    while (depth <= limit) & (weight != 0):
+        met, lost = _follow(draft, Sight(origin, direction, off, turn, shift, scale))
+        local, loss, mirror = _shade(draft, met, rounding)
         found = met.hit != NOTHING
         colour = dr.select(found, dr.fma(local, weight, colour), colour)
-        error = dr.select(found, dr.fma(dr.abs(weight), loss, error), error)
-        doubt |= met.doubt | (found & open_met)
+        error = dr.select(lost, dr.inf, dr.select(found, dr.fma(dr.abs(weight), loss, error), error))
         depth += 1
-        weight = draft.model.reflected_weight(weight, mirror_met, depth)
+        weight = dr.select(found, draft.model.reflected_weight(weight, mirror, depth), 0)
         origin = draft.model.reflected_origin(met.point, met.normal)
-        direction = mirrored(direction, met.normal)
-        leaving = met.hit
-        off, turn, shift = met.off, met.turn + bend_met, met.shift
-    return dr.select(seen.hit != NOTHING, colour, 0), doubt | ((seen.hit != NOTHING) & ~(error < FAITHFUL))
+        direction, off, turn, shift, scale = met.direction, met.off, met.turn, met.shift, met.scale
+    return colour, ~(error < FAITHFUL)
 
 
-def _look(draft: Draft, camera: Vector, unit: Vector) -> Landing:
-    """Where the camera's rays meet surfaces, worked out in double precision and rounded once."""
-    world, search, none = draft.world, draft.search, draft.search.Float(0)
-    turn = search.Float(6 * ROUNDOFF)
-    sight = Sight(search.Vector(*EYE), unit, none, turn, none, search.Index(NOTHING))
-    hit, rival, doubt = nearest(search, sight, search.Mask(True))
-    row, is_sphere = world.row(hit), hit < world.first_plane
-    place, across = world.Vector(*row[:3]), world.Vector(*row[4:7])
-    near, _ = draft.model.sphere_distances(-place, camera, dr.dot(camera, camera), row[3], False)
-    far = draft.model.plane_distance(place, across, dr.dot(camera, across), False)
-    exact = camera * dr.select(is_sphere, near, far)
-    normal = search.Vector(dr.select(is_sphere, draft.model.sphere_normal(exact, place, row[3]), across))
-    point = search.Vector(exact)
-    shift = (dr.abs(point.x) + dr.abs(point.y) + dr.abs(point.z)) * ROUNDOFF
-    clear = (dr.dot(point, unit) * CERTAIN < rival) & (dr.abs(dr.dot(unit, normal)) > GRAZED)
-    return Landing(hit, point, normal, (shift, 2 * ROUNDOFF, shift, turn), doubt | ((hit != NOTHING) & ~clear))
-
-
-def _follow(draft: Draft, ray: Sight) -> Landing:
-    """Where mirrored rays meet surfaces."""
+def _look(draft: Draft, camera: Vector) -> Landing:
+    """Where the camera's rays meet surfaces, corrected once by how far the point is from the surface."""
     search = draft.search
-    hit, rival, doubt = nearest(search, ray, search.Mask(True))
-    row, is_sphere = search.row(hit), hit < search.first_plane
-    place, size = search.Vector(*row[:3]), dr.abs(row[3])
-    p = ray.origin - place
-    h = dr.dot(p, ray.d)
-    way = dr.fma(ray.d, -h, p)
-    near = -h - dr.sqrt(dr.fma(row[3], row[3], -dr.dot(way, way)))
-    t = dr.select(is_sphere, near, (row[3] - dr.dot(place, ray.origin)) * dr.rcp(dr.dot(place, ray.d)))
-    point = dr.fma(ray.d, t, ray.origin)
-    normal = dr.select(is_sphere, draft.model.sphere_normal(point, place, row[3]), place)
-    curvature = dr.select(is_sphere, dr.rcp(row[3]), 0)
-    along = dr.dot(ray.d, normal)
-    slope = dr.select(is_sphere, -along, dr.abs(along))
-
-    slack = draft.shades.row(hit)[6]
-    far = dr.abs(point.x) + dr.abs(point.y) + dr.abs(point.z)
-    aside = dr.fma(t + far, slack, dr.fma(8 * ROUNDOFF, size, 1.25 * dr.fma(ray.turn, t, ray.off)))
-    onto = dr.fma(16, t, dr.fma(1.2, far, 9 * size)) * ROUNDOFF
-    shift = dr.fma(aside, dr.rcp(slope), onto)
-    tilt = dr.fma(shift, curvature, 2 * ROUNDOFF)
-    clear = ((t + shift) * CERTAIN < rival) & (slope > GRAZED) & (8 * aside * curvature < slope * slope)
-    doubt |= ~(ray.turn < STEADY) | ((hit != NOTHING) & ~clear)
-    errors = shift, tilt, dr.fma(2 * onto, slope, 3.5 * aside), dr.fma(2, dr.fma(onto, curvature, tilt), ray.turn)
-    return Landing(hit, point, normal, errors, doubt)
+    toward = search.Vector(camera)
+    per_length = dr.rcp(dr.norm(toward))
+    d = toward * per_length
+    hit, rival = seen(search, d, search.Mask(True))
+    is_sphere = hit < search.first_plane
+    x, y, z, size, curvature, *_ = search.row(hit, hit != NOTHING)
+    place = search.Vector(x, y, z)
+    along = dr.dot(place, d)
+    way = dr.fma(d, along, -place)
+    near = along - dr.sqrt(dr.fma(size, size, -dr.dot(way, way)))
+    t = dr.select(is_sphere, near, -size * dr.rcp(along))
+    centre = dr.select(is_sphere, place, 0)
+    q = dr.fma(toward, t * per_length, -centre)
+    left = dr.select(is_sphere, 0.5 * dr.fma(size, size, -dr.dot(q, q)), -size - dr.dot(place, q))
+    step = left * dr.rcp(dr.select(is_sphere, dr.dot(q, d), along))
+    q = dr.fma(d, step, q)
+    landing = Landing(draft, hit, (t, q + centre, dr.select(is_sphere, q * curvature, place), curvature), d)
+    aside = dr.fma(step * step, curvature, search.coarse + dr.select(is_sphere, 4 * ROUNDOFF * size, 0))
+    aside = dr.fma(landing.far, draft.camera_slack, aside)
+    landing.bound(aside, landing.far * (2.5 * ROUNDOFF), search.Float(CAMERA_TURN), rival)
+    return landing
 
 
-def _shade(draft: Draft, at: Landing, depth: Number) -> tuple[Vector, Number, Mask, Number, Number]:
-    """The colour sent out, how far off it may be, where that is in doubt, the mirror and what rounding turns there."""
+def _follow(draft: Draft, ray: Sight) -> tuple[Landing, Mask]:
+    """Where mirrored rays meet surfaces, and where even that is in doubt."""
     search = draft.search
-    red, green, blue, diffuse, mirror, brightness, _, bend = draft.shades.row(at.hit)
-    surface, to_light = search.Vector(red, green, blue), draft.light - at.point
-    distance, cosine = dr.norm(to_light), draft.model.cosine(at.normal, to_light)
-    facing = cosine != 0
-    dark, open_ = blocked(search, at.point, to_light, distance, at.shift, at.hit, facing)
-    diffused = draft.model.diffuse(surface, diffuse, cosine)
-    colour = draft.model.ambient(surface, draft.ambient, draft.ambient_coefficient)
-    colour += dr.select(facing & ~dark, diffused, 0)
-    loss = dr.fma(at.shift, dr.rcp(distance), at.tilt) + dr.fma(depth, 2, 16) * ROUNDOFF
-    return colour, brightness * loss, facing & open_, mirror, bend
+    hit, t, rival, doubt = nearest(search, ray, search.Mask(True))
+    is_sphere = hit < search.first_plane
+    x, y, z, size, curvature, *_ = search.row(hit, hit != NOTHING)
+    point, place = dr.fma(ray.d, t, ray.origin), search.Vector(x, y, z)
+    normal = dr.select(is_sphere, (point - place) * curvature, place)
+    landing = Landing(draft, hit, (t, point, normal, curvature), ray.d)
+    aside = dr.fma(1.25, dr.fma(ray.turn, t, ray.off), search.coarse + dr.select(is_sphere, 8 * ROUNDOFF * size, 0))
+    aside = dr.fma(t + landing.far, draft.slack, aside)
+    onto = dr.fma(16, t, dr.fma(1.2, landing.far, 9 * size)) * ROUNDOFF
+    landing.bound(aside, onto, ray.turn, rival)
+    return landing, doubt
+
+
+def _shade(draft: Draft, at: Landing, rounding: Number) -> tuple[Vector, Number, Number]:
+    """The colour sent out, its error as a share of the brightest, infinite where in doubt, and the mirror.
+
+    Ambient and diffuse light as in the model, with their common factor taken out.
+    """
+    search = draft.search
+    red, green, blue, diffuse, mirror, brightness, *_ = draft.shades.row(at.hit, at.hit != NOTHING)
+    to_light = draft.light - at.point
+    length = dr.norm(to_light)
+    nearness = dr.rcp(length)
+    d = to_light * nearness
+    cosine = dr.dot(at.normal, d)
+    facing = cosine > 0
+    error = dr.fma(at.scale, ROUNDING, at.shift)
+    dark, open_ = blocked(search, at.point, d, length, error, facing)
+    light = dr.select(facing & ~dark, diffuse * cosine, 0)
+    colour = search.Vector(red, green, blue) * (draft.ambient + light)
+    moved = dr.fma(1.15 * dr.abs(cosine), at.shift, at.off + at.onto)
+    loss = brightness * dr.fma(moved, nearness, dr.fma(at.shift, at.curvature, rounding))
+    return colour, dr.select(at.doubt | ~(error < search.room) | (facing & open_), dr.inf, loss), mirror

@@ -3,11 +3,13 @@
 Every surface is looked for as if it reached farther by all that errors can move it or the ray, so that a distance found
 is a lower bound of the true one, and what is not found is not there. What is closer to call than that is in doubt.
 
-Rays start outside all spheres, since they are followed from surface to surface, and what does not is in doubt as well.
+Rays are followed from the eye, surface by surface, so they stay outside all spheres and on the eye's side of every
+plane: a sphere lies ahead where p.d < 0, p = origin - centre, a plane where d.n < 0, n toward the eye; the surface left
+does neither. Where the light is on that side as well, no plane throws a shadow.
 
 u = 2^-24 is the roundoff of single precision, S bounds all coordinates in play. Rounding the ray and the surfaces, and
-p = origin - centre, h = p.d, l = p - h d, each move the ray's way past the centre by a few u S, by 18 u S in all, and
-h and the distance of a plane by no more.
+p, h = p.d, l = p - h d, each move the ray's way past the centre by a few u S, by 18 u S in all, and h and the distance
+of a plane by no more. For camera rays, of length 1 but for 5 u, (c.d)^2 - c.c is off by 21 u c.c.
 """
 
 from __future__ import annotations
@@ -15,125 +17,187 @@ from __future__ import annotations
 from math import copysign, dist, hypot
 
 import drjit as dr
+from numpy import float32
 
 from reference.device import Types
 from reference.model import SHIFT, Mask, Number, Vector
 from reference.scene import EYE, LIGHT, SCREEN_CORNERS, SCREEN_DISTANCE, Plane, Scene, Triple
 from reference.tables import NOTHING, Rows, State
 
-ROUNDING = 24 * 2.0**-24  # of S: what looking a surface up may be off
-PARALLEL = 8 * 2.0**-24  # what rounding may leave of d.n for unit vectors
-CLOSE = 1.01 * SHIFT  # up to this distance some convention does not look for surfaces
-WIDEST = 1e3  # an error beyond this, or one that is not a number, is no bound at all
+ROUNDOFF = 2.0**-24
+ROUNDING = 24 * ROUNDOFF  # of S: what looking a surface up may be off
+SQUARED = 32 * ROUNDOFF  # of c.c: what rounding may leave of (c.d)^2 - c.c
+PARALLEL = 8 * ROUNDOFF  # what rounding may leave of d.n for unit vectors
+CAMERA_TURN = 6 * ROUNDOFF  # radians; what rounding may turn a camera ray
+GRAZED = 1.1e-3  # |d.n| up to which some convention misses a plane
+WINDOW = 1.01 * SHIFT  # of the way to the light, up to which some convention does not look for surfaces
+CLOSE = WINDOW / GRAZED  # a ray that has come so far is farther than SHIFT from the surface that it left
+SLIP = 2.0**-12  # of the scene's size: how far the start of a ray may be shifted along it
+FARTHEST = 1e12  # of what scenes extend to
+APART = 2.0**-9  # of the scene's size: how far the light must be from surfaces
 
 
 class Sight:
-    """Rays of unit length, with how far each may be `off` its way, turned (radians), and its start shifted along it."""
+    """Rays of unit length, which may be `off` their way and turned (radians). `scale` bounds what they have in play."""
 
-    def __init__(self, origin: Vector, d: Vector, off: Number, turn: Number, shift: Number, leaving: Number) -> None:
-        self.origin, self.d, self.leaving = origin, d, leaving
-        self.off, self.turn, self.shift = off, turn, shift
+    def __init__(self, origin: Vector, d: Vector, off: Number, turn: Number, shift: Number, scale: Number) -> None:
+        self.origin, self.d, self.off, self.turn, self.shift, self.scale = origin, d, off, turn, shift, scale
 
 
 class Search(Rows):
     """The surfaces of a scene in single precision.
 
-    A sphere's row: centre, radius. A plane's: unit normal, on the side of the light, and how far it is along it.
+    A sphere's row: centre, radius, curvature, r^2 - c.c as camera rays need it. A plane's: unit normal toward the eye,
+    how far it is behind the eye, zero, and how far for camera rays.
     """
 
     def __init__(self, scene: Scene, types: Types) -> None:
-        rows: list[State] = [(*s.centre, s.radius) for s in scene.spheres]
-        rows += [_toward_light(plane) for plane in scene.planes]
-        super().__init__(types, len(scene.spheres), rows, width=4)
-        reach = [hypot(*s.centre) + s.radius for s in scene.spheres] + [abs(height) for *_, height in rows]
-        self.size = self.uniform(max([*reach, hypot(*LIGHT)]))
+        planes = [_toward_eye(plane) for plane in scene.planes]
+        size = extent(scene)
+        error = size * (CAMERA_TURN + ROUNDING)
+        rows: list[State] = [_sphere_row(s.centre, s.radius, error) for s in scene.spheres]
+        rows += [(*normal, height, 0, height - error, 0, 0) for *normal, height in planes]
+        super().__init__(types, len(scene.spheres), rows, width=8)
+        self.size = self.uniform(size)
+        self.coarse = self.uniform(max(_coarseness(row) for row in [*rows, (0.0,)]))
         clear = [dist(s.centre, LIGHT) - s.radius for s in scene.spheres]
-        clear += [abs(_distance(p, LIGHT)) for p in scene.planes]
-        self.room = self.uniform(min([WIDEST, *clear]) / 2 - 0.01)
+        self.room = self.uniform(min([*clear, *(abs(distance(p, LIGHT)) for p in scene.planes), size]) / 8)
+        self.sharpest = self.uniform(max((1 / s.radius for s in scene.spheres), default=0))
 
-    def error(self, point: Vector, off: Number, turn: Number) -> Number:
-        """How far from its place a surface may seem along a ray from `point`, which may be `off` and turned."""
-        scale = dr.abs(point.x) + dr.abs(point.y) + dr.abs(point.z) + self.size
-        return dr.fma(scale, turn + ROUNDING, off)
-
-
-def _toward_light(plane: Plane) -> State:
-    normal = plane.unit_normal
-    sign = -copysign(1, _distance(plane, LIGHT))
-    return (*(sign * value for value in normal), sign * _distance(plane, EYE))
+    def scale(self, point: Vector) -> Number:
+        """A bound of all coordinates in play around a point."""
+        return dr.abs(point.x) + dr.abs(point.y) + dr.abs(point.z) + self.size
 
 
-def _distance(plane: Plane, place: Triple) -> float:
+def _coarseness(row: State) -> float:
+    """How far single precision moves a surface, but for what it turns a plane."""
+    *place, size = (abs(value - float(float32(value))) for value in row[:4])
+    return 1.001 * float(hypot(*place) + size)
+
+
+def extent(scene: Scene) -> float:
+    """A bound of all coordinates of surfaces and of the light."""
+    reach = [hypot(*s.centre) + s.radius for s in scene.spheres] + [abs(distance(p, EYE)) for p in scene.planes]
+    return 1 + max([*reach, hypot(*LIGHT)])
+
+
+def _sphere_row(centre: Triple, radius: float, error: float) -> State:
+    square = sum(value * value for value in centre)
+    return (*centre, radius, 1 / radius, (radius + error) ** 2 - square * (1 - SQUARED), 0, 0)
+
+
+def _toward_eye(plane: Plane) -> State:
+    height = -distance(plane, EYE)
+    sign = copysign(1, height)
+    return (*(sign * value for value in plane.unit_normal), sign * height)
+
+
+def distance(plane: Plane, place: Triple) -> float:
+    """How far the place is behind the plane, along its unit normal; rounded."""
     return sum(n * (a - b) for n, a, b in zip(plane.unit_normal, plane.point, place, strict=True))
 
 
 def is_clear(scene: Scene) -> bool:
-    """Whether the camera's rays meet nothing before the screen: it would count only beyond."""
-    spheres = all(s.centre[2] - s.radius > 1.001 * SCREEN_DISTANCE for s in scene.spheres)
-    return spheres and all(_holds_no_part(plane) for plane in scene.planes)
+    """Whether the camera's rays meet nothing before the screen: it would count only beyond.
+
+    And whether the light is apart from all surfaces, outside the spheres and on the eye's side of the planes, and no
+    square overflows.
+    """
+    room = APART * extent(scene)
+    if room > APART * FARTHEST:
+        return False
+    spheres = all(
+        s.centre[2] - s.radius > 1.001 * SCREEN_DISTANCE and dist(s.centre, LIGHT) - s.radius > room
+        for s in scene.spheres
+    )
+    return spheres and all(_holds_no_part(plane, room) for plane in scene.planes)
 
 
-def _holds_no_part(plane: Plane) -> bool:
-    """Whether the eye and the corners of the screen are well on one side of the plane."""
-    sides = [_distance(plane, place) for place in (EYE, *SCREEN_CORNERS)]
-    return min(sides) > 0.001 * max(sides) > 0 or max(sides) < 0.001 * min(sides) < 0
+def _holds_no_part(plane: Plane, room: float) -> bool:
+    """Whether the eye, the light and the corners of the screen are well on one side of the plane."""
+    sides = [distance(plane, place) for place in (EYE, *SCREEN_CORNERS)]
+    light = distance(plane, LIGHT)
+    return (min(sides) > 0.001 * max(sides) > 0 and light > room) or (
+        max(sides) < 0.001 * min(sides) < 0 and light < -room
+    )
 
 
-def nearest(search: Search, ray: Sight, active: Mask) -> tuple[Number, Number, Mask]:
-    """Index of what each ray meets first, a distance that nothing else comes before, and where that is in doubt."""
-    error = search.error(ray.origin, ray.off, ray.turn)
+def _closer(index: Number, t: Number, best: Number, rival: Number, hit: Number) -> State:
+    """The two nearest; a distance that is not a number is none."""
+    later = dr.select(t < best, best, t)
+    return dr.select(t < best, t, best), dr.select(later < rival, later, rival), dr.select(t < best, index, hit)
+
+
+def seen(search: Search, d: Vector, active: Mask) -> tuple[Number, Number]:
+    """Index of what each camera ray meets first, and a distance that nothing else comes before."""
+
+    def meet_sphere(index: Number, row: list[Number], *found: Number) -> State:
+        ahead = dr.dot(search.Vector(*row[:3]), d)
+        t = ahead - dr.sqrt(dr.fma(ahead, ahead, row[5]))
+        return _closer(index, dr.select(ahead > 0, t, dr.inf), *found)
+
+    def meet_plane(index: Number, row: list[Number], *found: Number) -> State:
+        facing = (CAMERA_TURN + PARALLEL) - dr.dot(search.Vector(*row[:3]), d)
+        return _closer(index, dr.select(facing > 0, row[5] * dr.rcp(facing), dr.inf), *found)
+
+    nothing = search.Float(dr.inf), search.Float(dr.inf), search.Index(NOTHING)
+    _, rival, hit = search.through(meet_sphere, meet_plane, nothing, lambda *_: active)
+    return hit, rival
+
+
+def nearest(search: Search, ray: Sight, active: Mask) -> tuple[Number, Number, Number, Mask]:
+    """Index of what each ray meets first, how far it is, a distance that nothing else comes before, and where even that
+    is in doubt.
+    """
+    widened = ray.turn + PARALLEL
+    error = dr.fma(ray.scale, ray.turn + ROUNDING, ray.off)
     near = error + ray.shift
 
-    def closer(index: Number, ahead: Mask, t: Number, best: Number, rival: Number, hit: Number) -> State:
-        t = dr.select(ahead & (ray.leaving != index), t, dr.inf)
-        later = dr.select(t < best, best, t)
-        return dr.select(t < best, t, best), dr.select(later < rival, later, rival), dr.select(t < best, index, hit)
+    def closer(index: Number, t: Number, keep: Number, best: Number, rival: Number, hit: Number, kept: Number) -> State:
+        return *_closer(index, t, best, rival, hit), dr.select(t < best, keep, kept)
 
     def meet_sphere(index: Number, row: list[Number], *found: Number) -> State:
         p, radius = ray.origin - search.Vector(*row[:3]), row[3] + error
         h = dr.dot(p, ray.d)
         way = dr.fma(ray.d, -h, p)
         root = dr.sqrt(dr.fma(radius, radius, -dr.dot(way, way)))
-        return closer(index, root - h > -near, -h - root, *found)
+        return closer(index, dr.select(h < near, -h - root, dr.inf), root, *found)
 
     def meet_plane(index: Number, row: list[Number], *found: Number) -> State:
         normal = search.Vector(*row[:3])
-        height, facing = row[3] - dr.dot(normal, ray.origin), dr.dot(normal, ray.d)
-        ahead = dr.mulsign(height, facing)
-        t = (ahead - error) * dr.rcp(dr.abs(facing) + (ray.turn + PARALLEL))
-        return closer(index, ahead > -near, t, *found)
+        facing = widened - dr.dot(normal, ray.d)
+        t = (dr.dot(normal, ray.origin) + row[3] - error) * dr.rcp(facing)
+        return closer(index, dr.select(facing > 0, t, dr.inf), facing, *found)
 
-    nothing = search.Float(dr.inf), search.Float(dr.inf), search.Index(NOTHING)
-    best, rival, hit = search.through(meet_sphere, meet_plane, nothing, lambda *_: active)
-    return hit, rival - error, ~(best > near + CLOSE) | ~(error < WIDEST)
+    nothing = search.Float(dr.inf), search.Float(dr.inf), search.Index(NOTHING), search.Float(0)
+    best, rival, hit, kept = search.through(meet_sphere, meet_plane, nothing, lambda *_: active)
+    size = search.row(hit, hit != NOTHING)[3]  # without the error, which widened the root and moved the plane
+    root = dr.sqrt(dr.fma(kept, kept, -error * dr.fma(2, size, error)))
+    plane = dr.fma(best, kept, error) * dr.rcp(kept - widened)
+    t = dr.select(hit < search.first_plane, best + (kept - root), plane)
+    return hit, t, rival, ~(best > near + CLOSE)
 
 
-def blocked(
-    search: Search, point: Vector, to_light: Vector, distance: Number, off: Number, leaving: Number, active: Mask
-) -> tuple[Mask, Mask]:
-    """Whether anything stands between each point, which may be `off`, and the light, and where that is in doubt."""
-    d = to_light * dr.rcp(distance)
-    error = search.error(point, off, search.Float(0))
-    close = dr.fma(distance, CLOSE, error)
-    twice, small = 2 * error, close * close
+def blocked(search: Search, point: Vector, d: Vector, length: Number, error: Number, active: Mask) -> tuple[Mask, Mask]:
+    """Whether a sphere stands between each point, which may be off by `error`, and the light, and where that is in
+    doubt.
+    """
+    close = dr.fma(length, WINDOW, error)
+    # (r^2 - l.l) / r is less than twice how far inside the ray passes; a ray from outside that is past the centre by
+    # less than `close` may have l.l as small as r^2 - close^2.
+    edge = dr.fma(close * close, search.sharpest, 2 * error)
 
-    def hidden(inside: Number, edge: Number, between: Mask, surely: Number, perhaps: Number) -> State:
-        inside = dr.select(between, inside, -dr.inf)
-        sure, open_ = inside - edge, inside + edge
-        return dr.select(sure > surely, sure, surely), dr.select(open_ > perhaps, open_, perhaps)
-
-    def meet_sphere(index: Number, row: list[Number], *found: Number) -> State:
+    def meet_sphere(index: Number, row: list[Number], deepest: Number) -> State:
         p = point - search.Vector(*row[:3])
         h = dr.dot(p, d)
         way = dr.fma(d, -h, p)
-        inside = dr.fma(row[3], row[3], -dr.dot(way, way))
-        return hidden(inside, dr.fma(twice, row[3], small), (leaving != index) & (h < close) & (h > -distance), *found)
+        inside = dr.select((h < close) & (h > -length), dr.fma(-dr.dot(way, way), row[4], row[3]), -dr.inf)
+        return (dr.select(inside > deepest, inside, deepest),)
 
-    def meet_plane(index: Number, row: list[Number], *found: Number) -> State:
-        return hidden(row[3] - dr.dot(search.Vector(*row[:3]), point), close, leaving != index, *found)
+    def meet_plane(index: Number, row: list[Number], deepest: Number) -> State:
+        return (deepest,)
 
-    nothing = search.Float(-dr.inf), search.Float(-dr.inf)
-    going = lambda surely, perhaps: active & ~(surely > 0)  # noqa: E731
-    surely, perhaps = search.through(meet_sphere, meet_plane, nothing, going)
-    dark = surely > 0
-    return dark, ~dark & ((perhaps > 0) | ~(error < search.room))
+    nothing = (search.Float(-dr.inf),)
+    (deepest,) = search.through(meet_sphere, meet_plane, nothing, lambda deepest: active & ~(deepest > edge))
+    dark = deepest > edge
+    return dark, ~dark & ~(deepest < -edge)

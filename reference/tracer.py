@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -42,9 +43,14 @@ def render(
     """
     if precision == "auto" and np.dtype(dtype) == np.float64:
         precision = "double"
+    asked: dict[str, Any] = {"width": width, "height": height, "depth": depth, "precision": precision, "device": device}
+    bands = render_bands(scene, model, **asked)
+    first = next(bands).astype(dtype, copy=False)
+    if len(first) == height:
+        return first
     picture = np.empty((height, width, 3), dtype)
     top = 0
-    for band in render_bands(scene, model, width=width, height=height, depth=depth, precision=precision, device=device):
+    for band in chain([first], bands):
         picture[top : top + len(band)] = band
         top += len(band)
     return picture

@@ -70,20 +70,16 @@ class World(Rows):
     def draw(self, view: View, top: int, count: int) -> Number:
         """Red, green and blue of each pixel in turn, in `count` rows from `top` on."""
         if self.tree is None:
-            return self.colours(view, top, dr.arange(self.Index, count * view.width))
+            return dr.ravel(self.colours(view, top, dr.arange(self.Index, count * view.width)))
         pixel, place = tiles(self, view.width, count)
-        colour = self.radiance(view, top, pixel) + dr.zeros(self.Vector, dr.width(pixel))
+        colour = self.colours(view, top, pixel)
         dr.eval(colour)
         return dr.ravel(dr.gather(self.Vector, colour, place))
 
-    def colours(self, view: View, top: int, pixel: Number) -> Number:
-        """Red, green and blue of some pixels in turn, which are counted from the start of row `top`."""
-        colour = self.radiance(view, top, pixel)
-        return dr.ravel(colour + dr.zeros(self.Vector, dr.width(pixel)))  # one for each, be they all the same
-
-    def radiance(self, view: View, top: int, pixel: Number) -> Vector:
+    def colours(self, view: View, top: int, pixel: Number) -> Vector:
         """The colours of some pixels, which are counted from the start of row `top`."""
-        return _radiance(self, self.directions(view, top, pixel), dr.opaque(self.Index, view.depth))
+        colour = _radiance(self, self.directions(view, top, pixel), dr.opaque(self.Index, view.depth))
+        return colour + dr.zeros(self.Vector, dr.width(pixel))  # one for each, be they all the same
 
     def directions(self, view: View, top: int, pixel: Number) -> Vector:
         """Directions of the camera's rays, not of unit length."""
