@@ -141,15 +141,20 @@ def radiance(draft: Draft, camera: Vector, limit: Number) -> tuple[Vector, Mask]
     origin = draft.model.reflected_origin(first.point, first.normal)
     direction, off, turn, shift, scale = search.Vector(first.direction), first.off, first.turn, first.shift, first.scale
     while (depth <= limit) & (weight != 0):
-        met, lost = _follow(draft, Sight(origin, direction, off, turn, shift, scale))
-        local, loss, mirror = _shade(draft, met, rounding)
-        found = met.hit != NOTHING
-        colour = dr.select(found, dr.fma(local, weight, colour), colour)
-        error = dr.select(lost, dr.inf, dr.select(found, dr.fma(dr.abs(weight), loss, error), error))
+        hit, t, rival, doubt = _next(search, origin, direction, off, turn, shift, scale)
+        error = dr.select(doubt, dr.inf, error)
         depth += 1
-        weight = dr.select(found, draft.model.reflected_weight(weight, mirror, depth), 0)
-        origin = draft.model.reflected_origin(met.point, met.normal)
-        direction, off, turn, shift, scale = met.direction, met.off, met.turn, met.shift, met.scale
+        found = hit != NOTHING
+        if found:
+            met = _follow(draft, Sight(origin, direction, off, turn, shift, scale), hit, t, rival)
+            local, loss, mirror = _shade(draft, met, rounding)
+            colour = dr.fma(local, weight, colour)
+            error = dr.fma(dr.abs(weight), loss, error)
+            weight = draft.model.reflected_weight(weight, mirror, depth)
+            origin = draft.model.reflected_origin(met.point, met.normal)
+            direction, off, turn, shift, scale = met.direction, met.off, met.turn, met.shift, met.scale
+        else:
+            weight = search.Float(0)
     return colour, ~(error < FAITHFUL)
 
 
@@ -179,10 +184,15 @@ def _look(draft: Draft, camera: Vector) -> Landing:
     return landing
 
 
-def _follow(draft: Draft, ray: Sight) -> tuple[Landing, Mask]:
-    """Where mirrored rays meet surfaces, and where even that is in doubt."""
+def _next(
+    search: Search, origin: Vector, d: Vector, off: Number, turn: Number, shift: Number, scale: Number
+) -> tuple[Number, Number, Number, Mask]:
+    return nearest(search, Sight(origin, d, off, turn, shift, scale), search.Mask(True))
+
+
+def _follow(draft: Draft, ray: Sight, hit: Number, t: Number, rival: Number) -> Landing:
+    """Where mirrored rays meet surfaces."""
     search = draft.search
-    hit, t, rival, doubt = nearest(search, ray, search.Mask(True))
     is_sphere = hit < search.first_plane
     x, y, z, size, curvature, *_ = search.row(hit, hit != NOTHING)
     point, place = dr.fma(ray.d, t, ray.origin), search.Vector(x, y, z)
@@ -192,7 +202,7 @@ def _follow(draft: Draft, ray: Sight) -> tuple[Landing, Mask]:
     aside = dr.fma(t + landing.far, draft.slack, aside)
     onto = dr.fma(16, t, dr.fma(1.2, landing.far, 9 * size)) * ROUNDOFF
     landing.bound(aside, onto, ray.turn, rival)
-    return landing, doubt
+    return landing
 
 
 def _shade(draft: Draft, at: Landing, rounding: Number) -> tuple[Vector, Number, Number]:
