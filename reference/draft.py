@@ -14,8 +14,8 @@ from __future__ import annotations
 import drjit as dr
 
 from reference.device import Types
-from reference.model import Mask, Model, Number, Vector, is_convention, mirrored
-from reference.scene import LIGHT, Plane, Scene, Sphere
+from reference.model import DOCUMENT, Mask, Model, Number, Vector, is_convention, mirrored
+from reference.scene import EYE, LIGHT, Plane, Scene, Sphere
 from reference.search import (
     CAMERA_TURN,
     GRAZED,
@@ -42,11 +42,14 @@ def is_draftable(scene: Scene, model: Model) -> bool:
     """Whether the proofs are about this model, a convention, and this scene: see `is_clear`.
 
     Nothing may be so bright that it is seen by way of mirrors whose coefficients multiply to less than can be told from
-    zero in single precision.
+    zero in single precision. Where mirrored rays start beside the surface, normals must be toward the eye, as here.
     """
+    if not is_convention(model) or model.camera_direction is not DOCUMENT.camera_direction or not is_clear(scene):
+        return False
+    if model.reflected_origin is not DOCUMENT.reflected_origin and any(distance(p, EYE) > 0 for p in scene.planes):
+        return False
     surfaces: list[Sphere | Plane] = [*scene.spheres, *scene.planes]
-    brightest = max((_brightness(surface, _ambient(scene)) for surface in surfaces), default=0.0)
-    return brightest < BRIGHTEST and is_clear(scene) and is_convention(model)
+    return max((_brightness(surface, _ambient(scene)) for surface in surfaces), default=0.0) < BRIGHTEST
 
 
 class Draft:

@@ -1,4 +1,4 @@
-"""Where rays meet surfaces, by the model's steps. What a search has found only needs to be met, and not looked for."""
+"""Where rays meet surfaces, by the model's steps."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Numbers of surfaces on the device, as kernels read them.
 
 Surfaces are one numbered list, spheres before planes. Up to `UNROLLED` of them a kernel is straight code over uniform
-values, one kernel for each pair of counts; beyond that it loops over the surfaces, one kernel for every scene.
+values, one kernel for each pair of counts; beyond that it walks through a tree of the spheres and loops over the
+planes, one kernel for every scene.
 """
 
 from __future__ import annotations
@@ -90,15 +91,11 @@ class Rows:
     ) -> State:
         """Fold all surfaces into the state; of the spheres, those that rays may meet on their path."""
         if self.tree and path:
-            step = lambda place, sphere, *state: meet_sphere(place, self.known(place, sphere), *state)  # noqa: E731
+            step = lambda place, _, *state: meet_sphere(place, self.row(place), *state)  # noqa: E731
             state = self.tree.fold(*path, step, state, going)
         else:
             state = self.fold(0, self.spheres, meet_sphere, state, going)
         return self.fold(self.spheres, self.surfaces, meet_plane, state, going)
-
-    def known(self, index: Number, sphere: list[Number]) -> list[Number]:
-        """The row of a sphere whose centre and radius are known in single precision."""
-        return self.row(index) if self.width > len(sphere) else sphere
 
 
 def upload(kind: Any, numbers: NDArray[Any]) -> Any:

@@ -17,12 +17,6 @@ from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
 from reference.tables import BAND
 from reference.world import View, World
 
-LARGEST_NUMBER = {
-    "auto": 1e100,
-    "double": 1e100,
-    "single": 1e12,
-}  # of a coordinate: products of several must stay finite
-
 
 def render(
     scene: Scene,
@@ -69,15 +63,18 @@ def render_bands(
     """The picture of `render` from top to bottom, some rows at a time: rows x width x 3."""
     check_request(width, height, depth)
     view = View(width, height, depth)
-    artist = _artist(scene, model, precision, device)
+    artist = prepare(scene, model, precision=precision, device=device)
     rows = max(1, BAND // width)
     for top in range(0, height, rows):
         count = min(rows, height - top)
         yield artist.draw(view, top, count).numpy().reshape(count, width, 3)
 
 
-def _artist(scene: Scene, model: Model, precision: str, device: str) -> World | Draft:
-    """What draws the scene in the precision asked for."""
+def prepare(scene: Scene, model: Model = DOCUMENT, *, precision: str = "auto", device: str = "auto") -> World | Draft:
+    """The scene on the device, ready to `draw` rows of any view in the precision asked for.
+
+    Raises InputError and DeviceError as `render` does.
+    """
     types, single = array_types(precision, device), array_types("single", device)
     world = World(scene, model, types, single)
     drafted = precision == "auto" and world.tree is None and is_draftable(world.scene, model)

@@ -12,7 +12,7 @@ from random_scenes import random_scene
 from reference import draft
 from reference.device import array_types
 from reference.draft import Draft, is_draftable, radiance
-from reference.model import CONVENTIONS, DOCUMENT, EXACT
+from reference.model import CONVENTIONS, DOCUMENT, EXACT, PUBLISHED
 from reference.scene import Plane, Scene, Sphere
 from reference.tracer import render
 from reference.world import View, World
@@ -148,9 +148,19 @@ def test_many_spheres_are_drawn_as_in_double_precision(count: int) -> None:
 
 def test_drafts_are_of_conventions_only() -> None:
     assert all(is_draftable(ROOM, model) for model in CONVENTIONS.values())
-    assert is_draftable(ROOM, replace(EXACT, camera_direction=lambda column, row, across, down: (column, row, across)))
+    assert not is_draftable(ROOM, replace(EXACT, camera_direction=lambda *pixel: (*pixel[:2], 1)))
     assert not is_draftable(ROOM, replace(DOCUMENT, cosine=lambda normal, to_light: 1))
     assert not is_draftable(ROOM, replace(DOCUMENT, reflection=EXACT.reflection))
+
+
+def test_published_rays_start_on_the_side_of_the_normal() -> None:
+    """By 1e-4, which a small mirror shows: drafts have planes' normals toward the eye."""
+    away, small = replace(FLOOR, normal=(0, -1, 0), reflection=1), replace(BALL, radius=0.02, centre=(0, -99.9, 210))
+    scene = replace(ROOM, spheres=(small,), planes=(away,))
+    assert is_draftable(scene, DOCUMENT)
+    assert not is_draftable(scene, PUBLISHED)
+    assert is_draftable(replace(scene, planes=(FLOOR,)), PUBLISHED)
+    assert difference(scene, model=PUBLISHED, width=100, height=600) <= 0.01
 
 
 @pytest.mark.parametrize(

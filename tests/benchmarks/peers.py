@@ -1,8 +1,8 @@
 """How each contender's time is had: seconds from a scene at hand to the picture in memory.
 
-crossray: a call of `render`, warm. Mitsuba: a rendering in a process that has rendered before, by mitsuba_warm.py.
-POV-Ray, Tachyon and Radiance: what they report of tracing alone; each run is a new process. The C++ tracer: what
-it measures itself, warm. All use every core.
+crossray: preparing the scene and drawing it, warm, each known alone. Mitsuba: a rendering in a process that has
+rendered before, by mitsuba_warm.py. POV-Ray, Tachyon and Radiance: what they report of tracing alone; each run is a new process.
+The C++ tracer: what it measures itself, warm. All use every core.
 """
 
 from __future__ import annotations
@@ -18,12 +18,16 @@ from statistics import median
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
 from turns import Pace, Run, seconds
 
-from reference import Scene, render
+from reference import Scene
 from reference.device import PRECISIONS as KNOWN
+from reference.draft import Draft
 from reference.errors import RendererError
 from reference.text import dump
+from reference.tracer import prepare
+from reference.world import View, World
 from translator.contract import Export, Settings
 from translator.process import find_program, usable_cores
 from translator.registry import adapter
@@ -76,16 +80,22 @@ class Task:
         return {precision: partial(self.crossray, precision) for precision in order} | peers
 
     def crossray(self, precision: str) -> Run:
-        """Preparing is what a picture of a single pixel takes."""
+        """Preparing the scene, and drawing it as often as wanted."""
 
-        def draw_it(side: int) -> object:
-            return render(self.scene, width=side, height=side, depth=DEPTH, precision=precision, device="cpu")
+        def ready() -> World | Draft:
+            return prepare(self.scene, precision=precision, device="cpu")
 
+        def draw_it() -> NDArray[np.float32]:
+            pixels: NDArray[np.float32] = artist.draw(View(self.side, self.side, DEPTH), 0, self.side).numpy()
+            return pixels.reshape(self.side, self.side, 3)
+
+        artist = ready()
         start = perf_counter()
-        picture = np.asarray(draw_it(self.side))  # the first to warm up, and to compare
+        picture = draw_it()  # the first to warm up, and to compare
         renders = self.pace.renders if perf_counter() - start < LONG else 1
-        runs = [(seconds(partial(draw_it, self.side)), seconds(partial(draw_it, 1))) for _ in range(renders)]
-        return Run(median(whole for whole, _ in runs), median(one for _, one in runs), picture)
+        drawing = median(seconds(draw_it) for _ in range(renders))
+        preparing = median(seconds(ready) for _ in range(renders))
+        return Run(drawing + preparing, preparing, picture)
 
     @property
     def settings(self) -> Settings:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from statistics import median
 
-from derived import TITLES, Results, contenders, example_ratios, nanoseconds, others, ours, time_of, tracing_only
+from derived import OURS, TITLES, Results, contenders, example_ratios, nanoseconds, others, ours, time_of, tracing_only
 from objects import growth
 from roofline import shares
-from tables import NONE, factor, prepared, spread, table, time, times_faster
+from tables import NONE, factor, known, prepared, spread, table, time, times_faster, tracing
 from turns import Entry
 
 
@@ -22,6 +22,9 @@ def examples_section(part: Results) -> str:
         value = ratios[scene].get(name)
         return f"**{factor(value)}**" if value and value == worst[name] else factor(value)
 
+    def shown(row: Mapping[str, Entry], name: str) -> str:
+        return spread(tracing(row[name]) if name in OURS and known(row.get(name)) else row.get(name))
+
     everyone = contenders(rows)
     proving = [
         [s, factor(times_faster(row["certify"], row["double"])), spread(row["certify"])] for s, row in rows.items()
@@ -33,8 +36,10 @@ def examples_section(part: Results) -> str:
         ratios=table(
             ["scene", *(f"{TITLES[name]} / ours" for name in names)], ([s, *(cell(s, n) for n in names)] for s in rows)
         ),
-        times=table(
-            ["", *rows], ([TITLES[name], *(spread(row.get(name)) for row in rows.values())] for name in everyone)
+        times=table(["", *rows], ([TITLES[name], *(shown(row, name) for row in rows.values())] for name in everyone)),
+        ready=table(
+            ["", *rows],
+            ([TITLES[n], *(time(prepared(row.get(n)) or 0) for row in rows.values())] for n in everyone if n in OURS),
         ),
         off=table(
             ["", *rows],
@@ -162,7 +167,9 @@ def _missing(part: Results) -> str:
 EXAMPLES = """\
 ## The document's examples
 
-{side} x {side} pixels; how many times as long as {ours} the others take. **Bold**: the worst scene.
+{side} x {side} pixels; how many times as long as {ours} the others take. **Bold**: the worst scene. Times are of
+tracing up to the picture in memory, crossray's without preparing the scene, as peers report theirs; preparing stands
+below.
 
 {ratios}
 ![ratios](benchmarks-examples.svg)
@@ -170,6 +177,9 @@ EXAMPLES = """\
 The times:
 
 {times}
+Preparing the scene in crossray, in every call of `render`:
+
+{ready}
 Pixels over half a level off crossray's picture in double precision:
 
 {off}
@@ -182,8 +192,8 @@ The first call of `render` in a new process, of {ours}, once; Dr.Jit keeps compi
 OBJECTS = """\
 ## The number of spheres
 
-A hill of spheres at random, with a floor and a wall; {side} x {side} pixels. Times are of tracing alone, crossray's
-without preparing the scene, as peers report theirs; preparing stands below.
+A hill of spheres at random, with a floor and a wall; {side} x {side} pixels. Times are of tracing alone, as peers
+report theirs; crossray's are without preparing the scene up to 1,000 spheres, and with it beyond.
 
 {ratios}
 ![time against the number of spheres](benchmarks-objects.svg)
@@ -193,8 +203,8 @@ The times:
 {times}
 Time grows as the number of spheres to the power of (fitted from 1,000 on): {growth}.
 
-Preparing the scene: of crossray, what a picture of a single pixel takes, from the scene in memory, in every call of
-`render`; of POV-Ray its bounding, of Tachyon its preprocessing, of Mitsuba loading the scene file, compiling excluded.
+Preparing the scene: of crossray, from the scene in memory, in every call of `render`; of POV-Ray its bounding, of
+Tachyon its preprocessing, of Mitsuba loading the scene file, compiling excluded.
 Reading is of crossray's own scene file, in Python.
 
 {ready}
