@@ -1,8 +1,8 @@
 """How each contender's time is had: seconds from a scene at hand to the picture in memory.
 
 crossray: preparing the scene and drawing it, warm, each known alone. Mitsuba: a rendering in a process that has
-rendered before, by mitsuba_warm.py. POV-Ray, Tachyon and Radiance: what they report of tracing alone; each run is a new process.
-The C++ tracer: what it measures itself, warm. All use every core.
+rendered before, by mitsuba_warm.py. POV-Ray, Tachyon and Radiance: what they report of tracing alone; each run is a new
+process. The C++ tracer: what it measures itself, warm. All use every core.
 """
 
 from __future__ import annotations
