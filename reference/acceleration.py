@@ -24,7 +24,7 @@ from reference.tables import State, upload
 
 Number = Any  # a Dr.Jit array
 
-LEAF = 4  # spheres in a leaf, at most
+LEAF = 3  # spheres in a leaf, at most
 BOXES = 3  # packets of four numbers in a node: its children's boxes, each two corners
 SAMPLE = 64  # spheres that tell a node's longest side
 FLATTEST = 1e-18  # component of a direction, so that its reciprocal and products with that stay finite
