@@ -31,7 +31,7 @@ def nearest(world: World, window: Window, ray: Ray, active: Mask) -> tuple[Numbe
     def meet_plane(index: Number, row: list[Number], best: Number, hit: Number, listed: Number) -> State:
         t, counts = reach_plane(world, window, ray, index, row)
         counts &= t < best
-        return dr.select(counts, t, best), dr.select(counts, index, hit), listed
+        return dr.select(counts, t, best), dr.select(counts, index, hit), dr.select(counts, dr.inf, listed)
 
     miss = (world.Float(dr.inf), world.Index(NOTHING), world.Float(0))
     path = world.path(ray, lambda best, *_: best)

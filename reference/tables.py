@@ -1,8 +1,8 @@
 """Numbers of surfaces on the device, as kernels read them.
 
 Surfaces are one numbered list, spheres before planes. Up to `UNROLLED` of them a kernel is straight code over uniform
-values, one kernel for each pair of counts; beyond that it walks through a tree of the spheres and loops over the
-planes, one kernel for every scene.
+values, one kernel for each pair of counts; beyond that it walks through a tree of the spheres, one kernel for each
+number of planes up to a few, and one for all scenes with more, over which it loops.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from reference.acceleration import Tree
 
 UNROLLED = 16  # surfaces; beyond this, compile time outweighs what straight code gains
+FEW_PLANES = 4  # that are straight code beside many spheres
 BAND = 1 << 22  # pixels a kernel launch, which bounds the memory of large pictures
 MATERIAL = 8  # numbers in a row of materials
 TILE = 4  # pixels a side
@@ -54,9 +55,10 @@ class Rows:
         self.Vector, self.Packet, self.Double = types.Vector3, types.Vector4, types.Double
         self.tree = tree
         table = np.asarray(rows, np.float64 if self.Float is self.Double else np.float32).reshape(-1, width)
-        self.straight = [list(map(self.uniform, row.tolist())) for row in table] if len(table) <= UNROLLED else []
         self.numbers = upload(self.Float, table)
         self.spheres, self.surfaces, self.width = spheres, len(table), width
+        first = 0 if len(table) <= UNROLLED else spheres if len(table) - spheres <= FEW_PLANES else len(table)
+        self.straight = {index: list(map(self.uniform, table[index].tolist())) for index in range(first, len(table))}
         self.first_plane = dr.opaque(self.Index, spheres)
 
     def uniform(self, value: float) -> Number:
@@ -65,16 +67,16 @@ class Rows:
 
     def row(self, index: Number, active: Mask = True) -> list[Number]:
         """The numbers of a surface, fetched in packets of four, or one by one where there are few."""
-        if self.straight:
+        if 0 in self.straight:
             masks = [index == place for place in range(1, len(self.straight))]
-            return [_pick(column, masks) for column in zip(*self.straight, strict=True)]
+            return [_pick(column, masks) for column in zip(*self.straight.values(), strict=True)]
         packets = self.width // 4
         parts = (dr.gather(self.Packet, self.numbers, packets * index + part, active) for part in range(packets))
         return [number for packet in parts for number in packet]
 
     def fold(self, first: int, last: int, step: Step, state: State, going: Callable[..., Mask]) -> State:
         """Apply `state = step(index, row, *state)` to surfaces first..last-1, while rays are `going(*state)`."""
-        if self.straight:
+        if first == last or first in self.straight:
             for index in range(first, last):
                 state = step(self.Index(index), self.straight[index], *state)
             return state
@@ -90,11 +92,11 @@ class Rows:
         self, meet_sphere: Step, meet_plane: Step, state: State, going: Callable[..., Mask], path: Path | None = None
     ) -> State:
         """Fold all surfaces into the state; of the spheres, those that rays may meet on their path."""
-        if self.tree and path:
+        if self.tree and path:  # planes first: the tree is then walked no farther than they are
+            state = self.fold(self.spheres, self.surfaces, meet_plane, state, going)
             step = lambda place, _, *state: meet_sphere(place, self.row(place), *state)  # noqa: E731
-            state = self.tree.fold(*path, step, state, going)
-        else:
-            state = self.fold(0, self.spheres, meet_sphere, state, going)
+            return self.tree.fold(*path, step, state, going)
+        state = self.fold(0, self.spheres, meet_sphere, state, going)
         return self.fold(self.spheres, self.surfaces, meet_plane, state, going)
 
 
