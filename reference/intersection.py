@@ -25,15 +25,16 @@ def nearest(world: World, window: Window, ray: Ray, active: Mask) -> tuple[Numbe
 
     def meet_sphere(index: Number, row: list[Number], best: Number, hit: Number, listed: Number) -> State:
         t, counts = reach_sphere(world, window, ray, index, row)
-        counts &= (t < best) | ((t == best) & (row[5] < listed)) if world.tree else t < best
-        return dr.select(counts, t, best), dr.select(counts, index, hit), dr.select(counts, row[5], listed)
+        number = dr.gather(world.Index, world.listed, index) if world.tree else index
+        counts &= (t < best) | ((t == best) & (number < listed)) if world.tree else t < best
+        return dr.select(counts, t, best), dr.select(counts, index, hit), dr.select(counts, number, listed)
 
     def meet_plane(index: Number, row: list[Number], best: Number, hit: Number, listed: Number) -> State:
         t, counts = reach_plane(world, window, ray, index, row)
         counts &= t < best
-        return dr.select(counts, t, best), dr.select(counts, index, hit), dr.select(counts, dr.inf, listed)
+        return dr.select(counts, t, best), dr.select(counts, index, hit), dr.select(counts, NOTHING, listed)
 
-    miss = (world.Float(dr.inf), world.Index(NOTHING), world.Float(0))
+    miss = (world.Float(dr.inf), world.Index(NOTHING), world.Index(0))
     path = world.path(ray, lambda best, *_: best)
     t, hit, _ = world.through(meet_sphere, meet_plane, miss, lambda *_: active, path)
     return t, hit

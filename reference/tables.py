@@ -77,8 +77,10 @@ class Rows:
     def fold(self, first: int, last: int, step: Step, state: State, going: Callable[..., Mask]) -> State:
         """Apply `state = step(index, row, *state)` to surfaces first..last-1, while rays are `going(*state)`."""
         if first == last or first in self.straight:
+            # Beside many spheres a plane's number is no part of the code, which would be another for each scene.
+            start = self.Index(first) if 0 in self.straight else self.first_plane
             for index in range(first, last):
-                state = step(self.Index(index), self.straight[index], *state)
+                state = step(start + (index - first), self.straight[index], *state)
             return state
 
         def body(index: Number, *state: Number) -> State:

@@ -15,7 +15,19 @@ from reference.errors import InputError
 from reference.intersection import Ray, blocked, nearest
 from reference.model import Model, Number, Vector, is_convention
 from reference.scene import EYE, LIGHT, SCREEN, Scene, holds_light
-from reference.tables import MATERIAL, NOTHING, UNROLLED, Path, Rows, column, geometry, pixel_places, shading, tiles
+from reference.tables import (
+    MATERIAL,
+    NOTHING,
+    UNROLLED,
+    Path,
+    Rows,
+    column,
+    geometry,
+    pixel_places,
+    shading,
+    tiles,
+    upload,
+)
 
 FARTHER = 1 + 2.0**-20  # so that a rounded distance is no nearer
 LARGEST = {"double": 1e100, "single": 1e12}  # of a coordinate: products of several must stay finite
@@ -53,6 +65,7 @@ class World(Rows):
         rows[: len(order), :6] = np.column_stack([spheres[order], lit[order], order])
         rows[len(order) :] = planes or 0
         super().__init__(types, len(order), rows, 8, tree)
+        self.listed = upload(self.Index, order.astype(np.uint32)) if tree else None
         self.materials = Rows(types, len(order), np.concatenate([materials[order], materials[len(order) :]]), MATERIAL)
         self.ambient = self.Vector(*map(self.uniform, scene.ambient))
         self.ambient_coefficient = self.uniform(scene.ambient_coefficient)
