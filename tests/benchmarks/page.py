@@ -123,8 +123,8 @@ median with the least and the largest. Where one run takes long, there are fewer
 
 What is timed:
 
-- crossray: a call of `render`, from the scene in memory to the picture in memory, float32, with its kernel compiled;
-  five calls a round.
+- crossray: drawing a prepared scene up to the picture in memory, float32, with its kernel compiled, and preparing it:
+  both the median of five a round.
 - Mitsuba 3: a rendering by our plugin in a process that has rendered before, the median of five, with `dr.freeze` or
   without, whichever is faster. `crossray check` shows the time without.
 - POV-Ray and Tachyon: what they report of tracing alone, without parsing, bounding or preprocessing and files. Each
