@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import dist, hypot, isclose
+from math import dist, hypot, inf, isclose
 from pathlib import Path
 from typing import TypeVar
 
@@ -61,11 +61,18 @@ class Plane:
         return across, _cross(normal, across)
 
     def distance_from(self, origin: Triple) -> float:
-        """(point - origin) . unit_normal, rounded only at the end: 0 exactly if `origin` lies in the plane."""
+        """(point - origin) . unit_normal, rounded only at the end: 0 exactly if `origin` lies in the plane.
+
+        Infinite where it is too far for a number.
+        """
         largest = max(abs(value) for value in self.normal)
         normal = [exact(value) / exact(largest) for value in self.normal]
         arm = [exact(a) - exact(b) for a, b in zip(self.point, origin, strict=True)]
-        return float(sum(a * b for a, b in zip(arm, normal, strict=True))) / hypot(*map(float, normal))
+        along = sum(a * b for a, b in zip(arm, normal, strict=True))
+        try:
+            return float(along) / hypot(*map(float, normal))
+        except OverflowError:
+            return inf if along > 0 else -inf
 
 
 def _cross(a: Triple, b: Triple) -> Triple:

@@ -324,3 +324,10 @@ def test_light_on_one_of_many_spheres(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(random_scene(60, seed=4), spheres=(*random_scene(60, seed=4).spheres, ball))
     assert holds_light(ball)
     assert np.array_equal(render(scene, width=80, height=80, dtype=float), without_tree(scene, monkeypatch, size=80))
+
+
+def test_a_plane_may_be_farther_than_numbers_go() -> None:
+    plane = Plane((0, 0, 0), (1.7976931348623157e308, 0, 1.0793728971405305e292), (1, 0, 1), 0, 0)
+    assert plane.distance_from((0, 0, 0)) == np.inf
+    with pytest.raises(InputError, match="expected coordinates up to 1e\\+100 in double precision"):
+        render(Scene((0, 0, 0), 0, (), (plane,)), width=3, height=3)
