@@ -42,12 +42,10 @@ class Tree:
         self.types = types
         leaves, counts = sort(centres)
         self.order: NDArray[np.intp] = leaves[counts]
-        spheres = np.column_stack([centres, radii])
-        self.spheres = upload(types.Float, spheres[self.order].astype(np.float32))
         self.ends = upload(types.Index, np.append(0, np.cumsum(counts.sum(axis=1))).astype(np.uint32))
-        inside = spheres[leaves]
-        low = (inside[..., :3] - inside[..., 3:]).min(axis=1, initial=np.inf)
-        high = (inside[..., :3] + inside[..., 3:]).max(axis=1, initial=-np.inf)
+        inside, reach = centres[leaves], radii[leaves, None]
+        low = (inside - reach).min(axis=1, initial=np.inf)
+        high = (inside + reach).max(axis=1, initial=-np.inf)
         nodes = boxes(low, high)
         self.nodes = upload(types.Float, nodes)
         self.leaves = dr.opaque(types.Index, len(leaves))
@@ -63,11 +61,11 @@ class Tree:
         state: State,
         going: Callable[..., Number],
     ) -> State:
-        """Apply `state = step(place, sphere, *state)` to the spheres that a ray may meet, roughly from near to far.
+        """Apply `state = step(place, *state)` to the spheres that a ray may meet, roughly from near to far.
 
         The ray is float32: `origin` and `direction` (of any length, not 0), and `margin`, how far its points and the
         spheres may be off. Nothing beyond t = `reach(*state)` is sought, and nothing when not `going(*state)`.
-        `place` is the sphere's in `order`; `sphere` its float32 centre and radius. A sphere is visited once or never.
+        `place` is the sphere's in `order`. A sphere is visited once or never.
         """
         number, index, packet = self.types.Float, self.types.Index, self.types.Vector4
         inverse = [dr.rcp(dr.select(dr.abs(d) < FLATTEST, dr.copysign(number(FLATTEST), d), d)) for d in direction]
@@ -115,7 +113,7 @@ class Tree:
             place, end = dr.gather(index, self.ends, leaf), dr.gather(index, self.ends, leaf + 1)
 
             def meet_sphere(place: Number, *state: Number) -> State:
-                return (place + 1, *step(place, dr.gather(packet, self.spheres, place), *state))
+                return (place + 1, *step(place, *state))
 
             _, *state = dr.while_loop((place, *state), lambda place, *_: place < end, meet_sphere)
             node, pending = climb(node, pending)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import dist, hypot, inf, isclose
 from pathlib import Path
-from typing import TypeVar
 
 Triple = tuple[float, float, float]
 
@@ -79,9 +79,6 @@ def _cross(a: Triple, b: Triple) -> Triple:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-Surface = TypeVar("Surface", Sphere, Plane)
-
-
 @dataclass(frozen=True, slots=True)
 class Scene:
     """What a scene file says: ambient colour (levels), ambient coefficient, spheres and planes in file order."""
@@ -114,29 +111,37 @@ def merge_coincident(scene: Scene) -> Scene:
 
     Compared on the decimals as written, without rounding. Planes coincide whichever way their normals point.
     """
-    spheres: dict[tuple[Triple, float], Sphere] = {}
-    for sphere in scene.spheres:
-        spheres.setdefault((sphere.centre, sphere.radius), sphere)
-    return replace(scene, spheres=tuple(spheres.values()), planes=tuple(distinct_planes(scene).values()))
+    return replace(
+        scene,
+        spheres=tuple(scene.spheres[place] for place in _first_spheres(scene)),
+        planes=tuple(scene.planes[place] for place in _first_planes(scene)),
+    )
 
 
 def distinct_spheres(scene: Scene) -> dict[str, Sphere]:
     """The spheres that `merge_coincident` keeps, by name: `sphere 2` is the file's second."""
-    return _first_of_each("sphere", scene.spheres, [(sphere.centre, sphere.radius) for sphere in scene.spheres])
+    return {f"sphere {place + 1}": scene.spheres[place] for place in _first_spheres(scene)}
 
 
 def distinct_planes(scene: Scene) -> dict[str, Plane]:
     """The planes that `merge_coincident` keeps, by name: `plane 2` is the file's second."""
-    return _first_of_each("plane", scene.planes, [_plane_identity(plane) for plane in scene.planes])
+    return {f"plane {place + 1}": scene.planes[place] for place in _first_planes(scene)}
 
 
-def _first_of_each(
-    kind: str, surfaces: tuple[Surface, ...], identities: list[tuple[object, ...]]
-) -> dict[str, Surface]:
+def _first_spheres(scene: Scene) -> Iterable[int]:
+    return _first_of_each((sphere.centre, sphere.radius) for sphere in scene.spheres)
+
+
+def _first_planes(scene: Scene) -> Iterable[int]:
+    return _first_of_each(map(_plane_identity, scene.planes))
+
+
+def _first_of_each(identities: Iterable[tuple[object, ...]]) -> Iterable[int]:
+    """The first place of each identity."""
     first: dict[tuple[object, ...], int] = {}
     for place, identity in enumerate(identities):
         first.setdefault(identity, place)
-    return {f"{kind} {place + 1}": surfaces[place] for place in first.values()}
+    return first.values()
 
 
 def holds_light(sphere: Sphere) -> bool:

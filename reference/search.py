@@ -32,7 +32,6 @@ CAMERA_TURN = 6 * ROUNDOFF  # radians; what rounding may turn a camera ray
 GRAZED = 1.1e-3  # |d.n| up to which some convention misses a plane
 WINDOW = 1.01 * SHIFT  # of the way to the light, up to which some convention does not look for surfaces
 CLOSE = WINDOW / GRAZED  # a ray that has come so far is farther than SHIFT from the surface that it left
-SLIP = 2.0**-12  # of the scene's size: how far the start of a ray may be shifted along it
 FARTHEST = 1e12  # of what scenes extend to
 APART = 2.0**-9  # of the scene's size: how far the light must be from surfaces
 
@@ -63,10 +62,6 @@ class Search(Rows):
         clear = [dist(s.centre, LIGHT) - s.radius for s in scene.spheres]
         self.room = self.uniform(min([*clear, *(abs(distance(p, LIGHT)) for p in scene.planes), size]) / 8)
         self.sharpest = self.uniform(max((1 / s.radius for s in scene.spheres), default=0))
-
-    def scale(self, point: Vector) -> Number:
-        """A bound of all coordinates in play around a point."""
-        return dr.abs(point.x) + dr.abs(point.y) + dr.abs(point.z) + self.size
 
 
 def _coarseness(row: State) -> float:

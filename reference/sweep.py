@@ -72,8 +72,9 @@ class BallWorld(Rows):
             geometry = [_sphere_row(s) if isinstance(s, HeldSphere) else _plane_row(s) for s in tables.surfaces]
             ambient = [_nearest(value)[0] for value in tables.ambient]
         super().__init__(types, len(scene.spheres), geometry, WIDTH)
-        self.materials = Rows(types, len(scene.spheres), shading(scene), MATERIAL)
-        self.fading = all(abs(mirror) <= 1 for mirror in shading(scene)[:, 4])
+        materials = shading(scene)
+        self.materials = Rows(types, len(scene.spheres), materials, MATERIAL)
+        self.fading = all(abs(mirror) <= 1 for mirror in materials[:, 4])
         self.ambient = self.Vector(*map(self.uniform, ambient))
         self.brightest = self.uniform(max(map(abs, ambient)))
         self.eye, self.light = self.held(EYE), self.held(LIGHT)

@@ -96,7 +96,7 @@ class Rows:
         """Fold all surfaces into the state; of the spheres, those that rays may meet on their path."""
         if self.tree and path:  # planes first: the tree is then walked no farther than they are
             state = self.fold(self.spheres, self.surfaces, meet_plane, state, going)
-            step = lambda place, _, *state: meet_sphere(place, self.row(place), *state)  # noqa: E731
+            step = lambda place, *state: meet_sphere(place, self.row(place), *state)  # noqa: E731
             return self.tree.fold(*path, step, state, going)
         state = self.fold(0, self.spheres, meet_sphere, state, going)
         return self.fold(self.spheres, self.surfaces, meet_plane, state, going)
@@ -142,8 +142,7 @@ def shading(scene: Scene) -> NDArray[np.float64]:
 
 def pixel_places(rows: Rows, width: int, top: int, pixel: Number) -> tuple[Number, Number]:
     """Column and row of pixels that are counted from the start of row `top`."""
-    row = _divided(rows, pixel, width)
-    column = pixel - row * dr.opaque(rows.Index, width)
+    row, column = _divided(rows, pixel, width)
     return rows.Float(column), rows.Float(row + dr.opaque(rows.Index, top))
 
 
@@ -154,17 +153,16 @@ def tiles(rows: Rows, width: int, count: int) -> tuple[Number, Number]:
     across, down = -(-width // TILE), -(-count // TILE)
     place = dr.arange(rows.Index, across * down * TILE * TILE)
     tile, inner = place // (TILE * TILE), place % (TILE * TILE)
-    below = _divided(rows, tile, across)
-    column = TILE * (tile - below * dr.opaque(rows.Index, across)) + inner % TILE
-    pixel = (TILE * below + inner // TILE) * dr.opaque(rows.Index, width) + column
+    below, beside = _divided(rows, tile, across)
+    pixel = (TILE * below + inner // TILE) * dr.opaque(rows.Index, width) + TILE * beside + inner % TILE
 
-    each = dr.arange(rows.Index, count * width)
-    row = _divided(rows, each, width)
-    column = each - row * dr.opaque(rows.Index, width)
+    row, column = _divided(rows, dr.arange(rows.Index, count * width), width)
     tile = row // TILE * dr.opaque(rows.Index, across) + column // TILE
     return pixel, (tile * TILE + row % TILE) * TILE + column % TILE
 
 
-def _divided(rows: Rows, numbers: Number, divisor: int) -> Number:
-    """The whole part of a quotient. Processors divide integers one by one; half a unit is more than rounding loses."""
-    return rows.Index((rows.Double(numbers) + 0.5) * dr.opaque(rows.Double, 1 / divisor))
+def _divided(rows: Rows, numbers: Number, divisor: int) -> tuple[Number, Number]:
+    """Quotient and remainder."""
+    # Processors divide integers one by one; half a unit is more than rounding loses.
+    quotient = rows.Index((rows.Double(numbers) + 0.5) * dr.opaque(rows.Double, 1 / divisor))
+    return quotient, numbers - quotient * dr.opaque(rows.Index, divisor)

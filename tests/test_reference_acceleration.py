@@ -9,12 +9,30 @@ from numpy.typing import NDArray
 
 from reference.acceleration import LEAF, Tree
 from reference.device import array_types, load_drjit
+from reference.tables import upload
 
 dr = load_drjit()
 TYPES = array_types("single", "cpu")
 NOTHING = 0xFFFFFFFF
 
 Spheres = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+class FilledTree(Tree):
+    """A tree that hands each step the sphere's centre and radius, too, in single precision."""
+
+    def __init__(self, types: Any, centres: NDArray[np.float64], radii: NDArray[np.float64]) -> None:
+        super().__init__(types, centres, radii)
+        rows = np.column_stack([centres, radii])[self.order]
+        self.spheres = upload(types.Float, rows.astype(np.float32))
+
+    def fold(
+        self, origin: Any, direction: Any, margin: Any, reach: Any, step: Any, state: Any, going: Any
+    ) -> tuple[Any, ...]:
+        def meet(place: Any, *state: Any) -> Any:
+            return step(place, dr.gather(TYPES.Vector4, self.spheres, place), *state)
+
+        return super().fold(origin, direction, margin, reach, meet, state, going)
 
 
 def cloud(random: np.random.Generator, n: int) -> Spheres:
@@ -76,7 +94,7 @@ def aim(random: np.random.Generator, spheres: Spheres) -> tuple[Any, Any, Any]:
     return tuple(ray + dr.opaque(TYPES.Float, 0) for ray in rays)  # a kernel depends on where NumPy's memory lies
 
 
-def loop(tree: Tree, *arguments: Any) -> Any:
+def loop(tree: FilledTree, *arguments: Any) -> Any:
     """What Tree.fold does, over all spheres."""
     _, _, _, _, step, state, going = arguments
 
@@ -108,7 +126,7 @@ def approach(rays: Any, centres: NDArray[np.float64], radii: NDArray[np.float64]
     return h, radii**2 - ((p - h[..., None] * d) ** 2).sum(axis=2)
 
 
-def nearest(fold: Callable[..., Any], tree: Tree, rays: Any, leaving: Any) -> list[NDArray[Any]]:
+def nearest(fold: Callable[..., Any], tree: FilledTree, rays: Any, leaving: Any) -> list[NDArray[Any]]:
     def step(place: Any, sphere: Any, best: Any, rival: Any, hit: Any) -> Any:
         t = dr.select(place == leaving, dr.inf, distance(rays, sphere))
         closer = t < best
@@ -122,7 +140,7 @@ def nearest(fold: Callable[..., Any], tree: Tree, rays: Any, leaving: Any) -> li
     return [number.numpy() for number in found]
 
 
-def blocked(fold: Callable[..., Any], tree: Tree, rays: Any, length: Any) -> NDArray[Any]:
+def blocked(fold: Callable[..., Any], tree: FilledTree, rays: Any, length: Any) -> NDArray[Any]:
     def step(place: Any, sphere: Any, dark: Any) -> Any:
         return (dark | (distance(rays, sphere) < length),)
 
@@ -137,10 +155,10 @@ def blocked(fold: Callable[..., Any], tree: Tree, rays: Any, length: Any) -> NDA
 def test_the_tree_finds_what_a_loop_finds(scene: Callable[..., Spheres], count: int) -> None:
     random = np.random.default_rng(count)
     spheres = scene(random, count)
-    tree, rays = Tree(TYPES, *spheres), aim(random, spheres)
+    tree, rays = FilledTree(TYPES, *spheres), aim(random, spheres)
     left = np.where(random.uniform(size=4096) < 0.5, random.integers(max(1, count), size=4096), NOTHING)
     leaving = TYPES.Index(left.astype(np.uint32))
-    found, expected = (nearest(fold, tree, rays, leaving) for fold in (Tree.fold, loop))
+    found, expected = (nearest(fold, tree, rays, leaving) for fold in (FilledTree.fold, loop))
     np.testing.assert_array_equal(found[0], expected[0])
     np.testing.assert_array_equal(found[1], expected[1])
     clear = found[0] < found[1]  # of two at the same distance either may come first
@@ -148,14 +166,14 @@ def test_the_tree_finds_what_a_loop_finds(scene: Callable[..., Spheres], count: 
     if count:
         assert np.isfinite(found[0]).mean() > 0.2
     length = TYPES.Float(random.uniform(0, 2e5 if scene is far_away else 600, 4096).astype(np.float32))
-    np.testing.assert_array_equal(blocked(Tree.fold, tree, rays, length), blocked(loop, tree, rays, length))
+    np.testing.assert_array_equal(blocked(FilledTree.fold, tree, rays, length), blocked(loop, tree, rays, length))
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_step_may_compute_in_double_precision(scene: Callable[..., Spheres]) -> None:
     random, double = np.random.default_rng(9), array_types("double", "cpu")
     centres, radii = scene(random, 300)
-    tree, rays = Tree(TYPES, centres, radii), aim(random, (centres, radii))
+    tree, rays = FilledTree(TYPES, centres, radii), aim(random, (centres, radii))
     origin, d = (double.Vector3(v) for v in rays[:2])
     table = double.Float(np.column_stack([centres, radii])[tree.order].ravel().tolist())
 
@@ -186,7 +204,7 @@ def test_a_step_may_compute_in_double_precision(scene: Callable[..., Spheres]) -
 def test_every_sphere_on_the_way_is_visited_once_and_few_others() -> None:
     random = np.random.default_rng(5)
     centres, radii = cloud(random, 1000)
-    tree, rays = Tree(TYPES, centres, radii), aim(random, (centres, radii))
+    tree, rays = FilledTree(TYPES, centres, radii), aim(random, (centres, radii))
 
     def step(place: Any, sphere: Any, met: Any, visited: Any) -> Any:
         return met + dr.select(distance(rays, sphere) < dr.inf, 1, 0), visited + 1
@@ -205,7 +223,7 @@ def test_every_sphere_on_the_way_is_visited_once_and_few_others() -> None:
 def test_near_spheres_come_first() -> None:
     random = np.random.default_rng(6)
     centres, radii = cloud(random, 1000)
-    tree, rays = Tree(TYPES, centres, radii), aim(random, (centres, radii))
+    tree, rays = FilledTree(TYPES, centres, radii), aim(random, (centres, radii))
 
     def step(place: Any, sphere: Any, best: Any, visited: Any) -> Any:
         return dr.minimum(best, distance(rays, sphere)), visited + 1
@@ -218,7 +236,7 @@ def test_near_spheres_come_first() -> None:
 @pytest.mark.parametrize("scene", SCENES)
 def test_every_sphere_is_in_one_leaf_and_in_the_boxes_above_it(scene: Callable[..., Spheres]) -> None:
     centres, radii = scene(np.random.default_rng(1), 777)
-    tree = Tree(TYPES, centres, radii)
+    tree = FilledTree(TYPES, centres, radii)
     assert sorted(tree.order) == list(range(777))
     ends, nodes = tree.ends.numpy(), tree.nodes.numpy().reshape(-1, 2, 2, 3)
     assert (ends[0], ends[-1]) == (0, 777)
@@ -239,10 +257,10 @@ def test_the_same_kernel_walks_every_tree() -> None:
     for count in (0, 3, 100, 1000):
         random = np.random.default_rng(count)
         spheres = cloud(random, count)
-        tree, rays = Tree(TYPES, *spheres), aim(random, spheres)
+        tree, rays = FilledTree(TYPES, *spheres), aim(random, spheres)
         dr.eval(rays)
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
             dr.kernel_history_clear()
-            nearest(Tree.fold, tree, rays, dr.opaque(TYPES.Index, NOTHING))
+            nearest(FilledTree.fold, tree, rays, dr.opaque(TYPES.Index, NOTHING))
             kernels |= {kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])}
     assert len(kernels) == 1

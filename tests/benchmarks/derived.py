@@ -55,16 +55,19 @@ def tracing_only(rows: Mapping[str, Any]) -> dict[str, dict[str, Entry]]:
     but for many spheres, where it is the whole time.
     """
     return {
-        number: {
-            n: tracing(e) if n in OURS and known(e) and int(number) < BUILT else e for n, e in row["contenders"].items()
-        }
+        number: {n: e if int(number) >= BUILT else alone(n, e) for n, e in row["contenders"].items()}
         for number, row in rows.items()
     }
 
 
+def alone(name: str, entry: Entry) -> Entry:
+    """A contender's entry with tracing alone, without preparing the scene, as peers report theirs."""
+    return tracing(entry) if name in OURS and known(entry) else entry
+
+
 def time_of(name: str) -> Callable[[Entry], float]:
     """Median seconds of tracing alone."""
-    return lambda entry: median((tracing(entry) if name in OURS else entry)["seconds"])
+    return lambda entry: median(alone(name, entry)["seconds"])
 
 
 def nanoseconds(entry: Entry | None, side: str) -> float | None:

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from statistics import median
 
-from derived import OURS, TITLES, Results, contenders, example_ratios, nanoseconds, others, ours, time_of, tracing_only
+from derived import (
+    OURS,
+    TITLES,
+    Results,
+    alone,
+    contenders,
+    example_ratios,
+    nanoseconds,
+    others,
+    ours,
+    time_of,
+    tracing_only,
+)
 from objects import growth
 from roofline import shares
-from tables import NONE, factor, known, prepared, spread, table, time, times_faster, tracing
+from tables import NONE, factor, prepared, spread, table, time, times_faster
 from turns import Entry
 
 
@@ -22,9 +34,6 @@ def examples_section(part: Results) -> str:
         value = ratios[scene].get(name)
         return f"**{factor(value)}**" if value and value == worst[name] else factor(value)
 
-    def shown(row: Mapping[str, Entry], name: str) -> str:
-        return spread(tracing(row[name]) if name in OURS and known(row.get(name)) else row.get(name))
-
     everyone = contenders(rows)
     proving = [
         [s, factor(times_faster(row["certify"], row["double"])), spread(row["certify"])] for s, row in rows.items()
@@ -36,7 +45,9 @@ def examples_section(part: Results) -> str:
         ratios=table(
             ["scene", *(f"{TITLES[name]} / ours" for name in names)], ([s, *(cell(s, n) for n in names)] for s in rows)
         ),
-        times=table(["", *rows], ([TITLES[name], *(shown(row, name) for row in rows.values())] for name in everyone)),
+        times=table(
+            ["", *rows], ([TITLES[n], *(spread(alone(n, row.get(n, {}))) for row in rows.values())] for n in everyone)
+        ),
         ready=table(
             ["", *rows],
             ([TITLES[n], *(time(prepared(row.get(n)) or 0) for row in rows.values())] for n in everyone if n in OURS),
