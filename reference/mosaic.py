@@ -87,7 +87,7 @@ class Mosaic:
         """The corners of all tiles, and which see planes alone, as far as their colours are right."""
         corners, middle, spread = self.tiles(view, count, top)
         sure, error = plain(self.draft.search, self.walls, middle, spread, dr.opaque(self.Index, view.depth))
-        return corners, sure & (error < FAITHFUL)
+        return corners, sure & (error < FAITHFUL) & dr.full(self.walls.Mask, True, len(corners))  # be they all the same
 
     def directions(self, view: View, top: Number, column: Number, row: Number) -> Vector:
         """Directions of the camera's rays in single precision, in which they are turned by less than CAMERA_TURN."""

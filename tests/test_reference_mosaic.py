@@ -48,9 +48,10 @@ def pixels(flags: Any, view: View) -> np.ndarray[Any, Any]:
 def plain_tiles(scene: Scene, model: Model, view: View) -> tuple[Any, Any]:
     """Which pixels are of plain tiles, as far as colours are right or not; and how far off colours may be."""
     drawn = mosaic(scene, model)
-    _, middle, spread = drawn.tiles(view, view.height, drawn.Index(0))
+    corners, middle, spread = drawn.tiles(view, view.height, drawn.Index(0))
     plain, error = beams.plain(drawn.draft.search, drawn.walls, middle, spread, drawn.Index(view.depth))
-    return pixels(plain.numpy(), view), pixels(error.numpy(), view)
+    all_of_them = dr.zeros(drawn.Float, len(corners))
+    return pixels((plain & (all_of_them == 0)).numpy(), view), pixels((error + all_of_them).numpy(), view)
 
 
 def scenes() -> Iterator[Any]:
@@ -140,9 +141,9 @@ def test_pictures_of_one_kind_of_tile() -> None:
     empty = Scene((255, 255, 255), 0.1, (), (wall,))
     full = Scene((255, 255, 255), 0.1, (Sphere((250, 200, 0), (0, 0, 900), 600, 0.7, 0.5),))
     for scene, all_plain in ((empty, True), (full, False), (Scene((0, 0, 0), 0), True)):
-        plain, _ = plain_tiles(scene, DOCUMENT, View(64, 48, 3))
+        plain, _ = plain_tiles(scene, DOCUMENT, View(400, 300, 3))
         assert plain.all() if all_plain else not plain.any()
-        drawn, right = (render(scene, width=64, height=48, precision=name) for name in ("auto", "double"))
+        drawn, right = (render(scene, width=400, height=300, precision=name) for name in ("auto", "double"))
         assert np.abs(drawn - right).max() <= 0.01
 
 
