@@ -198,7 +198,8 @@ def packed(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.ui
     """The boxes of all nodes' children, given each leaf's in steps of the grid: a row of 4 words."""
     shifts = np.arange(3, dtype=np.uint32) * np.uint32(BITS)
     corners = boxes(low.astype(np.uint32), high.astype(np.uint32))
-    return np.bitwise_or.reduce(corners << shifts, axis=-1).reshape(len(low), 4)
+    words: NDArray[np.uint32] = np.bitwise_or.reduce(corners << shifts, axis=-1)
+    return words.reshape(len(low), 4)
 
 
 def single(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint32]:

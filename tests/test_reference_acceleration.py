@@ -235,11 +235,11 @@ def test_near_spheres_come_first() -> None:
 
 def corners(tree: Tree) -> NDArray[Any]:
     """The boxes of all nodes' children, as rays meet them: nodes x 2 children x 2 corners x 3."""
-    node = dr.arange(TYPES.Index, dr.width(tree.ends) and tree.leaves[0])
-    found = np.array([value.numpy() for value in tree.corners(node, TYPES.Mask(True))], np.float64).T.reshape(
-        -1, 2, 2, 3
-    )
-    return found * np.array([step[0] for step in tree.step]) + np.array([start[0] for start in tree.start])
+    node = dr.arange(TYPES.Index, tree.leaves[0])
+    numbers = np.array([value.numpy() for value in tree.corners(node, TYPES.Mask(True))], np.float64)
+    step, start = (np.array([number[0] for number in numbers]) for numbers in (tree.step, tree.start))
+    found: NDArray[Any] = numbers.T.reshape(-1, 2, 2, 3) * step + start
+    return found
 
 
 def test_boxes_are_as_fine_as_spheres_need() -> None:
