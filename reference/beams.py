@@ -3,8 +3,8 @@
 All camera rays of a tile are followed at once, as a beam around the ray of its middle. Unit directions that differ by
 `spread` lead, a distance t from the eye, to points no more than spread * t apart, and still do when all are mirrored by
 the same plane, which is an isometry. So a beam that leaves no doubt which plane it meets, and passes all spheres on its
-way and on the light's, remains one. Rays that meet the plane before the middle one does are, until that does, no farther
-from where it does than light is looked for.
+way and on the light's, remains one. Rays that meet the plane before the middle one does are, until that does, no
+farther from where it does than light is looked for.
 
 On the way it is added up how far off `reference/walls.py` may be, by the bounds of `reference/draft.py` for the worst
 ray of the beam.
