@@ -69,6 +69,7 @@ def _compare(
         "over": None,
         "worst": [],
         "difference": None,
+        "maps": {},
     }
     if truth is None and picture["image"]:
         return {**result, "reason": "not compared: the reference is missing"}
@@ -80,6 +81,7 @@ def _compare(
     difference = f"{picture['image']}-difference"
     shown = np.nan_to_num(np.abs(np.clip(truth, 0, 255) - np.clip(levels, 0, 255)), nan=255)
     write_image(folder / f"{difference}.png", shown * AMPLIFIED)
+    maps = {name: _write_map(folder, f"{picture['image']}-{name}", values) for name, values in measured.maps.items()}
     places = _differing(error)
     limits = picture.get("limits") or {}
     reasons: list[Reason | None] = [None] * len(places)
@@ -95,7 +97,14 @@ def _compare(
         "over": measured.over,
         "worst": _worst(error, places, reasons),
         "difference": difference,
+        "maps": maps,
     }
+
+
+def _write_map(folder: Path, name: str, values: NDArray[np.float64]) -> str:
+    """A grey 8 bit picture of values 0..1 (larger ones are white), rounded; returns its name."""
+    write_image(folder / f"{name}.png", np.rint(np.clip(values, 0, 1) * 255)[..., None].repeat(3, axis=-1))
+    return name
 
 
 def _differing(error: NDArray[np.float64]) -> NDArray[np.intp]:
