@@ -1,9 +1,9 @@
 """Float pictures small enough for a page: fixed point, as differences from the reference, deflated.
 
-A value becomes the whole number of quanta nearest to it. The reference is stored as each value's difference from what
-its neighbours predict (left + above - above left), another picture as its difference from the reference; both modulo
-2**32, so that nothing is lost beyond the quantum. Differences are folded (0, -1, 1, -2, ... become 0, 1, 2, 3, ...), and
-their low bytes are stored before their next ones, as many bytes as the largest needs.
+A value becomes the whole number of quanta nearest to it. The reference is stored as the difference of each value from
+what its neighbours predict (left + above - above left), another picture as its difference from the reference; both
+modulo 2**32, so that nothing is lost beyond the quantum. Differences are folded (0, -1, 1, -2, ... become 0, 1, 2, 3,
+...), and their low bytes are stored before their next ones, as many bytes as the largest needs.
 """
 
 from __future__ import annotations
