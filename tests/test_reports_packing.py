@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from recorded import GREY, HEIGHT, NAME, WIDTH, altered, facts, record
 
 import reports.embedding
-from reference.image import read_image
+from reference.image import Picture, read_image
 from reports.embedding import embed
 from reports.packing import Quanta, pack_other, pack_reference, sample, to_quanta
 from reports.results import judge
@@ -70,7 +70,7 @@ def test_samples_keep_the_worst_pixel_of_each_block(width: int, height: int, ste
         assert kept[row, column] == error[row * step :, column * step :][:step, :step].max()
 
 
-SCENES = {
+SCENES: dict[str, list[tuple[dict[str, Any], Picture | None]]] = {
     "scenes/one.txt": [
         (facts("native"), GREY),
         (facts("povray"), altered((111, 61, 200))),

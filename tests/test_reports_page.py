@@ -190,9 +190,11 @@ def test_page_needs_nothing_else_and_nothing_is_injected(folder: Path) -> None:
     for tag, attributes in elements.found:
         assert tag not in ("link", "iframe", "object", "embed", "base", "b"), tag
         assert not [name for name in attributes if name.startswith("on")]
-        assert (attributes.get("src") or "data:image/png;base64,").startswith("data:image/png;base64,")
+        assert (attributes.get("src") or "data:image/jpeg;base64,").startswith("data:image/jpeg;base64,")
         assert (attributes.get("href") or "#").startswith("#")
-    assert [tag for tag, _ in elements.found].count("script") == 1
+    scripts = [attributes.get("type") for tag, attributes in elements.found if tag == "script"]
+    assert scripts.count(None) == scripts.count("application/json") == 1
+    assert set(scripts) == {None, "application/json", "application/octet-stream"}
     assert "url(" not in text
     assert "@import" not in text
     assert "{{ 7 * 7 }}" in text
@@ -200,7 +202,10 @@ def test_page_needs_nothing_else_and_nothing_is_injected(folder: Path) -> None:
 
 def test_page_records_how_each_picture_was_drawn(folder: Path) -> None:
     html = (folder / "report.html").read_text(encoding="utf-8")
-    assert "<pre>povray &#39;&lt;b&gt;&#39; &amp;&amp; true</pre><p>Povray 1.2 &lt;b&gt;, on 2 cores.</p>" in html
+    assert (
+        '<pre tabindex="0">povray &#39;&lt;b&gt;&#39; &amp;&amp; true</pre><p>Povray 1.2 &lt;b&gt;, on 2 cores.</p>'
+        in html
+    )
     assert "Tachyon of unknown" not in html
 
 

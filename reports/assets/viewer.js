@@ -107,6 +107,7 @@ function change(changes) {
 function changeScene(scene) {
   writeAddress({ ...Object.fromEntries(VIEW.map((name) => [name, ""])), view: scene.scene, a: state.a.renderer, b: state.b.renderer, mode: state.mode });
   showAddress();
+  change({});
 }
 
 // Draws at once what is decoded, and the rest as it becomes so.
