@@ -489,7 +489,7 @@ def test_marked_pixels_are_visited_worst_first_and_say_why(page: Page) -> None:
 
 
 SPOT = """([x, y]) => {
-  const [left, top] = toPane(panes()[0], x + 0.5, y + 0.5), r = Math.max(7, camera.zoom * 0.75) + 3;
+  const [left, top] = toPane(panes()[0], x + 0.5, y + 0.5), r = Math.ceil(Math.max(7, camera.zoom * 0.5 + 6)) + 3;
   const copy = new OffscreenCanvas(2 * r, 2 * r).getContext("2d", { willReadFrequently: true });
   copy.drawImage(canvas, r - left, r - top);
   const found = copy.getImageData(0, 0, 2 * r, 2 * r).data;

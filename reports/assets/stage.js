@@ -191,7 +191,7 @@ function drawFrame(pane, column, row) {
 }
 
 function drawMark(pane, mark) {
-  const [x, y] = toPane(pane, mark.column + 0.5, mark.row + 0.5), r = Math.max(7, camera.zoom * 0.75);
+  const [x, y] = toPane(pane, mark.column + 0.5, mark.row + 0.5), r = Math.max(7, camera.zoom * 0.5 + 6);
   const kind = kindOf(mark), path = new Path2D();
   if (kind === "unexplained") path.arc(x, y, r, 0, 7);
   else if (kind === "document-window") path.rect(x - r * 0.85, y - r * 0.85, r * 1.7, r * 1.7);

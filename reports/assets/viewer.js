@@ -221,6 +221,7 @@ function showValues() {
     const line = element("tr", {}, name);
     line.dataset.renderer = picture.renderer;
     if (!values) {
+      name.prepend(element("span", { className: "swatch none" }));
       line.append(element("td", { colSpan: 4, className: "quiet", textContent: picture.block ? "…" : picture.outcome.replaceAll("-", " "), title: picture.reason ?? "" }));
       return line;
     }
