@@ -522,7 +522,11 @@ def test_nothing_to_visit_is_no_error(page: Page) -> None:
 
 def test_every_key_does_what_the_help_says(page: Page) -> None:
     look(page, "view=edges&b=mitsuba&pixel=60,40")
-    press, value = page.keyboard.press, lambda name: entries(page).get(name)
+    press = page.keyboard.press
+
+    def value(name: str) -> str | None:
+        return entries(page).get(name)
+
     modes = ["slider", "blink", "side", "difference", "signed", "ssim", "flip"]
     for number, mode in reversed(list(enumerate(modes, 1))):
         press(str(number))
@@ -553,7 +557,7 @@ def test_every_key_does_what_the_help_says(page: Page) -> None:
     assert fitting < zooms[0] == zooms[1] / 2 == zooms[2] == 2 * zooms[3]
     press("0")
     assert page.evaluate("camera.zoom") == fitting
-    for key, name, expected in (
+    changes: tuple[tuple[str, str, str | None], ...] = (
         ("e", "exposure", "0.5"),
         ("E", "exposure", None),
         ("E", "exposure", "-0.5"),
@@ -566,9 +570,10 @@ def test_every_key_does_what_the_help_says(page: Page) -> None:
         ("m", "hide", None),
         ("}", "view", "slight"),
         ("{", "view", "edges"),
-    ):
+    )
+    for key, name, setting in changes:
         press(key)
-        assert value(name) == expected, key
+        assert value(name) == setting, key
     press("?")
     assert page.locator("dialog.help").is_visible()
     listed = page.locator("dialog.help kbd").all_inner_texts()

@@ -1,5 +1,6 @@
 """The three reports of one run."""
 
+import copy
 import json
 import shutil
 from html.parser import HTMLParser
@@ -14,6 +15,7 @@ from recorded import EDGE, GREY, HEIGHT, NAME, NEAR, WIDTH, altered, facts, reco
 
 from reference.image import read_image
 from reports.accounting import CLASSES
+from reports.page import page, sparkline
 from reports.terminal import summary_lines
 from reports.writing import write_reports
 
@@ -248,3 +250,36 @@ def test_file_name_that_is_not_utf8(tmp_path: Path) -> None:
     record(tmp_path, {"caf\udce9.txt": [(facts("native"), GREY)]})
     assert (tmp_path / "report.html").read_text(encoding="utf-8")
     assert (tmp_path / "junit.xml").read_text(encoding="utf-8")
+
+
+def test_what_a_run_need_not_have_is_shown_where_it_does(folder: Path, report: dict[str, Any]) -> None:
+    """History, approvals, terms and ray trees."""
+    results = copy.deepcopy(report)
+    results["history"] = [{"unexplained": number, "seconds": 2.0 * number} for number in (3, 0, 6)]
+    (scene,) = [scene for scene in results["scenes"] if scene["scene"] == "edges"]
+    wrong, other = scene["comparisons"]
+    wrong["approval"] = {"because": "a known <b>limit</b>", "until": "2026-11-01", "expired": True}
+    other["approval"] = {"because": "seen by all", "until": "2027-11-01", "expired": False}
+    wrong["worst"][0]["raytree"] = ["camera ray", "  hits </script><b>plane 1</b>"]
+    compared = [{"title": "Povray", "over": 3, "max_error": 20.0}, {"title": "Mitsuba", "over": 0, "max_error": 0.25}]
+    scene["terms"] = [{"title": "ambient", "image": scene["reference"]["image"], "comparisons": compared}]
+    html = page(folder, results)
+    assert html.count('points="2.0,12.0 60.0,21.0 118.0,3.0"') == 2
+    assert "Unexplained pixels of the last 3 runs: 3, 0, 6" in html
+    assert (
+        '<span class="approval expired" title="a known &lt;b&gt;limit&lt;/b&gt;">approval expired 2026-11-01</span>'
+        in html
+    )
+    assert "approved until 2027-11-01</span>, because seen by all" in html
+    assert '"raytree":["camera ray","  hits \\u003c/script\\u003e\\u003cb\\u003eplane 1\\u003c/b\\u003e"]' in html
+    assert 'Povray: <span class="wrong">3 pixels over 0.5</span>, at most 20' in html
+    assert "Mitsuba: agrees, at most 0.25" in html
+    assert page(folder, results) == html
+    for absent in ("Unexplained pixels of the last", "term by term", 'class="approval'):
+        assert absent in html
+        assert absent not in page(folder, report)
+
+
+@pytest.mark.parametrize(("values", "points"), [([], ""), ([0], "2.0,21.0"), ([1, None, 2], "2.0,12.0 118.0,3.0")])
+def test_sparklines(values: list[float | None], points: str) -> None:
+    assert sparkline(values) == points
