@@ -19,11 +19,16 @@ SSIM_WINDOW = 11  # pixels: Gaussian weights of sigma 1.5, cut at 3.5 sigma
 SETTINGS = {
     "ssim": "Wang et al. 2004: Gaussian weights, sigma 1.5, population covariance, data range 1, mean over RGB. "
     "Its mean hides single wrong pixels, and harmless resampling lowers it more than a missing highlight does.",
-    "ssim_min": "The smallest value of the SSIM map, averaged over RGB: the worst 11 x 11 neighbourhood.",
-    "psnr": "20 log10(255 / RMSE), in decibels; empty where the pictures are equal.",
-    "rmse": "Root mean square error over all pixels and channels, in levels.",
-    "flip": "Mean LDR-FLIP at 67 pixels per degree, levels / 255 taken as sRGB. Its mean hides small bugs.",
-    "max_error": "The largest error of any channel of any pixel, in levels.",
+    "ssim_min": "The smallest value of the SSIM map, averaged over RGB: the worst 11 x 11 neighbourhood. "
+    "It names a place, not a size: a faint edge in a dark corner can lower it more than a wrong light elsewhere.",
+    "psnr": "20 log10(255 / RMSE), in decibels; empty where the pictures are equal. "
+    "One number for the whole picture: ten wrong pixels of a million leave it high.",
+    "rmse": "Root mean square error over all pixels and channels, in levels. Blind to where the error is, "
+    "and to whether many pixels are a little wrong or a few very much.",
+    "flip": "Mean LDR-FLIP at 67 pixels per degree, levels / 255 taken as sRGB. Its mean hides small bugs; its map "
+    "shows what an eye would see at that distance, not what is wrong.",
+    "max_error": "The largest error of any channel of any pixel, in levels. It tells neither how many "
+    "pixels are wrong nor whether anybody is at fault: a knife edge can have a large one.",
 }
 
 

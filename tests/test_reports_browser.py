@@ -14,8 +14,10 @@ from playwright.sync_api import Browser, Dialog, Page, Request, sync_playwright
 from recorded import EDGES_PATH, GREY, HEIGHT, NAME, NEAR, WIDTH, altered, edges, facts, record, record_everything
 
 import reports.embedding
-from reference.image import Picture, read_image
+from reference.files import make_folder
+from reference.image import Picture, read_image, write_image
 from reports.accounting import CLASSES
+from reports.page import page as drawn
 
 
 @pytest.fixture(scope="module")
@@ -288,6 +290,12 @@ def truncated(value: Any) -> list[int]:
     return [int(channel) for channel in np.clip(np.round(value, 3) + 1e-9, 0, 255)]
 
 
+FIRST_PICTURE = """async () => {
+  const start = performance.now();
+  document.querySelector(".cell").click();
+  while (document.querySelector(".wait").textContent) await new Promise((done) => setTimeout(done, 5));
+  return performance.now() - start;
+}"""
 MARKERS = "unexplained,knife-edge,document-window,renderer-precision,declared-limit"
 LOOK = f"view=edges&a=native&b=mitsuba&hide={MARKERS}"
 
@@ -385,6 +393,9 @@ def test_maps_of_ssim_and_flip(page: Page, folder: Path, mode: str) -> None:
         entry_at = 3 * int(min(255, values[row, column] * 2))
         assert seen(page, column, row) == table[entry_at : entry_at + 3]
     assert page.locator(".legend .high").inner_text() == "0.5"
+    look(page, f"{LOOK}&mode={mode}&pixel=90,30")
+    unit = {"ssim": "1 − SSIM", "flip": "FLIP error"}[mode]
+    assert page.locator(".legend .unit").inner_text() == f"{unit} {values[30, 90] / 255:.3f} here"
     assert page.locator(".label-a").inner_text().endswith(": Mitsuba against Native")
 
 
@@ -813,3 +824,30 @@ def test_nothing_leaves_the_file(browser: Browser, folder: Path) -> None:
     refused = page.evaluate("fetch('https://example.org/').then(() => 'sent', () => 'refused')")
     assert refused == "refused"
     page.close()
+
+
+def test_large_pictures_are_there_at_once(browser: Browser, tmp_path: Path) -> None:
+    """First paint of the page, and two pictures of 1000 x 1000 drawn from their values: each well within a second."""
+    rows, columns = np.mgrid[:1000, :1000]
+    truth = np.stack([rows * 0.2, columns * 0.2, (rows + columns) * 0.1], axis=-1)
+    truth[(rows - 500) ** 2 + (columns - 400) ** 2 < 300**2] += 20.123
+    image = "images/large/{}"
+    make_folder(tmp_path / "images" / "large")
+    for name, picture in (("native", truth), ("povray", truth + 0.002 * (rows % 3)[..., None])):
+        for ending in (".exr", ".png"):
+            write_image(tmp_path / (image.format(name) + ending), picture)
+    blank = record(tmp_path / "blank", {"large.txt": [(facts("native"), GREY), (facts("povray"), GREY)]})
+    results = json.loads((blank / "report.json").read_text())
+    (scene,) = results["scenes"]
+    scene |= {"width": 1000, "height": 1000}
+    for picture in (scene["reference"], *scene["comparisons"]):
+        picture |= {"image": image.format(picture["renderer"]), "maps": {}}
+    (tmp_path / "report.html").write_text(drawn(tmp_path, results), encoding="utf-8")
+    trouble: list[str] = []
+    page = opened(browser, tmp_path, trouble)
+    paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
+    viewed = page.evaluate(FIRST_PICTURE)
+    assert seen(page, 30, 900) == truncated(truth[900, 30])
+    page.close()
+    assert trouble == []
+    assert (paint < 2000, viewed < 4000) == (True, True), (paint, viewed)  # milliseconds, on a machine at work

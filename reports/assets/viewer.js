@@ -177,7 +177,6 @@ function showLegend() {
   const top = Number((({ difference: 255, signed: 255 })[state.mode] ?? 1) / 2 ** state.gain).toPrecision(3) * 1;
   part(".legend .low").textContent = state.mode === "signed" ? `−${top}` : "0";
   part(".legend .high").textContent = state.mode === "signed" ? `+${top}` : String(top);
-  part(".legend .unit").textContent = { difference: "levels, worst channel", signed: "levels, worst channel", ssim: "1 − SSIM", flip: "FLIP error" }[state.mode] ?? "";
 }
 
 function showMarks() {
@@ -202,9 +201,19 @@ function errorOf(values, right) {
   return Math.max(...values.map((value, c) => (Number.isNaN(value - right[c]) && !(value === right[c]) ? 255 : Math.abs(clamped(value) - clamped(right[c])))));
 }
 
+const UNITS = { difference: "levels, worst channel", signed: "levels, worst channel", ssim: "1 − SSIM", flip: "FLIP error" };
+
+// What a map's colours mean, with its value at a pixel of the picture.
+function showUnit(place) {
+  const bytes = store.ready.get(mappedPicture(state.mode)?.maps[state.mode]);
+  const value = bytes && place ? ` ${(bytes[indexOf(state.scene, ...place)] / 255).toFixed(3)} here` : "";
+  part(".legend .unit").textContent = (UNITS[state.mode] ?? "") + value;
+}
+
 // Every renderer's values at the pixel under the pointer, else at the chosen one, and why they differ.
 function showValues() {
   const place = state.hover ?? state.pixel;
+  showUnit(place);
   if (!place) {
     part("h2.pixel").textContent = "Point at a pixel";
     part(".values tbody").replaceChildren();
