@@ -12,15 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.errors import SceneError, SceneWarning
+from reference.explanation import explain
 from reference.image import read_image, write_image
+from reference.model import CONVENTIONS
 from reference.proof import Prover
+from reference.scene import Scene
 from reference.text import parse
 from reports.accounting import CLASSES, Reason, account
 from reports.metrics import TOLERANCE, Measurement, error_map, measure
+from reports.raytree import ray_tree
 from reports.recording import read_run
 
 AMPLIFIED = 32  # the difference picture: 8 levels of error are white
 WORST = 50  # pixels listed for each comparison
+TREES = 12  # of them have their rays told
+MANY = 200  # surfaces, from which on no rays are told: each tree would name them all
 
 
 def judge(folder: Path, progress: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
@@ -35,27 +41,45 @@ def judge(folder: Path, progress: Callable[[str], None] = lambda text: None) -> 
 def _judge_scene(folder: Path, entry: dict[str, Any], progress: Callable[[str], None]) -> dict[str, Any]:
     reference, *others = entry["pictures"]
     truth = read_image(folder / f"{reference['image']}.exr") if reference["image"] else None
-    prover = _prover(entry)
+    scene = _scene(entry)
+    shape = {"width": entry["width"], "height": entry["height"], "depth": entry["depth"]}
+    prover = Prover(scene, **shape) if scene else None
+    trees: dict[tuple[int, int], list[str]] = {}
     comparisons = []
     for picture in others:
         progress(f"{entry['scene']}: {picture['renderer']}")
-        comparisons.append(_compare(folder, truth, picture, prover))
-    scene = {key: value for key, value in entry.items() if key != "pictures"}
+        comparison = _compare(folder, truth, picture, prover)
+        if scene and prover and prover.surfaces <= MANY:
+            _tell_rays(scene, entry, comparison["worst"][:TREES], trees)
+        comparisons.append(comparison)
+    facts = {key: value for key, value in entry.items() if key != "pictures"}
     seconds = reference["seconds"] if reference["trace_seconds"] is None else reference["trace_seconds"]
-    return {**scene, "seconds": seconds, "reference": reference, "comparisons": comparisons}
+    return {**facts, "seconds": seconds, "reference": reference, "comparisons": comparisons}
 
 
-def _prover(entry: dict[str, Any]) -> Prover | None:
-    """What can explain differences, where the scene is known."""
+def _scene(entry: dict[str, Any]) -> Scene | None:
+    """The scene of the pictures, where it is known, so that differences can be explained."""
     if entry["text"] is None:
         return None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SceneWarning)
-            scene = parse(entry["text"])
+            return parse(entry["text"])
     except SceneError:
         return None
-    return Prover(scene, width=entry["width"], height=entry["height"], depth=entry["depth"])
+
+
+def _tell_rays(
+    scene: Scene, entry: dict[str, Any], worst: list[dict[str, Any]], trees: dict[tuple[int, int], list[str]]
+) -> None:
+    """Put the reference's ray tree beside each of these pixels; `trees` keeps those of the whole scene."""
+    shape = {key: entry[key] for key in ("width", "height", "depth")}
+    for pixel in worst:
+        place = pixel["column"], pixel["row"]
+        if place not in trees:
+            told = explain(scene, CONVENTIONS[entry["convention"]], column=place[0], row=place[1], **shape)
+            trees[place] = list(ray_tree(told))
+        pixel["raytree"] = trees[place]
 
 
 def _compare(

@@ -11,13 +11,30 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from helpers import need
 from playwright.sync_api import Browser, Dialog, Page, Request, sync_playwright
-from recorded import EDGES_PATH, GREY, HEIGHT, NAME, NEAR, WIDTH, altered, edges, facts, record, record_everything
+from recorded import (
+    EDGES,
+    EDGES_PATH,
+    GREY,
+    HEIGHT,
+    NAME,
+    NEAR,
+    WIDTH,
+    altered,
+    edges,
+    facts,
+    record,
+    record_everything,
+)
 
 import reports.embedding
+from reference import EXACT
+from reference.explanation import explain
 from reference.files import make_folder
 from reference.image import Picture, read_image, write_image
+from reference.text import parse
 from reports.accounting import CLASSES
 from reports.page import page as drawn
+from reports.raytree import ray_tree
 
 
 @pytest.fixture(scope="module")
@@ -506,6 +523,18 @@ SPOT = """([x, y]) => {
   const found = copy.getImageData(0, 0, 2 * r, 2 * r).data;
   return found.filter((value, i) => i % 4 !== 3 && value > 90).length;
 }"""
+
+
+def test_rays_are_told_at_marked_pixels(page: Page) -> None:
+    scene = parse(EDGES)
+    for column, row in ((90, 30), NEAR):
+        look(page, f"view=edges&b=mitsuba&pixel={column},{row}&zoom=16")
+        shape = {"width": WIDTH, "height": HEIGHT, "depth": 3}
+        told = list(ray_tree(explain(scene, EXACT, column=column, row=row, **shape)))
+        assert page.locator("aside .why pre").text_content() == "\n".join(told)
+        assert told[0] == f"column {column}, row {row}, convention exact"
+    look(page, "view=edges&b=mitsuba&pixel=1,1")
+    assert page.locator("aside .why pre").count() == 0
 
 
 def test_each_class_has_a_marker_that_can_be_hidden(page: Page) -> None:

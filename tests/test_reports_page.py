@@ -118,6 +118,15 @@ def test_explained_pixels_are_listed_with_their_evidence_after_the_others(report
     ]
 
 
+def test_the_worst_pixels_have_their_rays_told_once_for_all(report: dict[str, Any]) -> None:
+    wrong, agreeing = (compared(report, renderer)["worst"] for renderer in ("mitsuba", "povray"))
+    for pixel in [*wrong, *agreeing]:
+        assert pixel["raytree"][0] == f"column {pixel['column']}, row {pixel['row']}, convention exact"
+        assert pixel["raytree"][-1].startswith("proof    ")
+    assert "knife edge" in wrong[-1]["raytree"][-1]
+    assert wrong[1]["raytree"] == agreeing[0]["raytree"]
+
+
 def test_terminal_lines_count_explained_pixels(report: dict[str, Any]) -> None:
     lines = [line for line in summary_lines(report) if line.startswith("edges")]
     explained = "3 knife-edge, 1 document-window; largest error 93.6 levels"

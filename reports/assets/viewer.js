@@ -255,9 +255,10 @@ function showWhy(scene, column, row) {
   const tree = found.map(([, mark]) => mark.raytree).find(Boolean);
   if (tree) {
     parts.push(element("details", { open: true }, element("summary", { textContent: `The rays of ${scene.pictures[0].title} behind it` }),
-      element("pre", { tabIndex: 0, textContent: Array.isArray(tree) ? tree.join("\n") : tree })));
-  } else if (scene.depth !== null && scene.path !== "-") {
-    parts.push(element("p", { className: "quiet", textContent: "The rays behind it: " }, element("code", { textContent:
+      element("pre", { tabIndex: 0, textContent: tree.join("\n") })));
+  }
+  if (scene.depth !== null && scene.path !== "-") {
+    parts.push(element("p", { className: "quiet", textContent: tree ? "Again: " : "The rays behind it: " }, element("code", { textContent:
       `crossray explain ${quoted(scene.path)} ${column} ${row} --size ${scene.width}x${scene.height} --depth ${scene.depth} --convention ${scene.convention}` })));
   }
   part(".why").replaceChildren(...parts);
