@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ SIGNS = {"failed": "!", "disagree": "✗", "not-compared": "?", "not-installed":
 SCRIPTS = ("pixels.js", "colours.js", "address.js", "overview.js", "stage.js", "viewer.js", "keys.js")
 SHOWN_RUNS = 30  # of the history
 SPARKLINE = (120, 24)  # pixels
+LONGEST_TEXT = 100_000  # characters of a scene file
 
 
 def page(folder: Path, results: dict[str, Any]) -> str:
@@ -33,7 +35,7 @@ def page(folder: Path, results: dict[str, Any]) -> str:
     )
     environment.filters |= {"number": number, "seconds": seconds, "sparkline": sparkline}
     scenes = [{**scene, "comparisons": sorted(scene["comparisons"], key=_badness)} for scene in results["scenes"]]
-    scenes.sort(key=lambda scene: min(map(_badness, [scene["reference"], *scene["comparisons"]])))
+    scenes.sort(key=lambda scene: min(map(_badness, _pictures(scene))))
     embedded = embed(folder, scenes)
     return environment.get_template("report.html").render(
         results=results,
@@ -44,7 +46,9 @@ def page(folder: Path, results: dict[str, Any]) -> str:
         history=results.get("history", [])[-SHOWN_RUNS:],
         outcome=outcome,
         signs=SIGNS,
-        thumbnail=lambda name: thumbnail(folder, name),
+        thumbnail=cache(lambda name: thumbnail(folder, name)),
+        longest=LONGEST_TEXT,
+        left_out=sum(_is_left_out(picture, embedded) for scene in scenes for picture in _pictures(scene)),
         settings=SETTINGS,
         thresholds=[f"{level:g}" for level in THRESHOLDS],
         tolerance=TOLERANCE,
@@ -92,6 +96,15 @@ def _summary(results: dict[str, Any]) -> str:
     )
 
 
+def _pictures(scene: dict[str, Any]) -> list[dict[str, Any]]:
+    """All of a scene, the reference first."""
+    return [scene["reference"], *scene["comparisons"]]
+
+
+def _is_left_out(picture: dict[str, Any], embedded: Embedded) -> bool:
+    return picture["image"] is not None and picture["image"] not in embedded.names
+
+
 def _viewer_data(scenes: list[dict[str, Any]], embedded: Embedded) -> dict[str, Any]:
     """What the viewer knows of the pictures; their values are in blocks of their own."""
     return {
@@ -105,8 +118,7 @@ def _viewer_data(scenes: list[dict[str, Any]], embedded: Embedded) -> dict[str, 
             {
                 **{key: scene[key] for key in ("scene", "path", "width", "height", "depth", "convention")},
                 "offsets": embedded.offsets.get(scene["scene"]),
-                "pictures": [_viewer_picture(scene["reference"], embedded)]
-                + [_viewer_picture(picture, embedded) for picture in scene["comparisons"]],
+                "pictures": [_viewer_picture(picture, embedded) for picture in _pictures(scene)],
             }
             for scene in scenes
         ],
@@ -118,7 +130,7 @@ def _viewer_picture(picture: dict[str, Any], embedded: Embedded) -> dict[str, An
     return {
         **{key: picture[key] for key in ("renderer", "title", "reason")},
         "outcome": outcome(picture),
-        "compared": compared,
+        "left_out": _is_left_out(picture, embedded),
         "unexplained": picture["pixels"]["unexplained"] if compared else 0,
         "differing": picture["over"][f"{TOLERANCE:g}"] if compared else 0,
         "worst": picture.get("worst", []),

@@ -13,6 +13,8 @@ import pytest
 from markupsafe import escape
 from recorded import EDGE, GREY, HEIGHT, NAME, NEAR, WIDTH, altered, facts, record, record_everything
 
+import reports.embedding
+import reports.page
 from reference.image import read_image
 from reports.accounting import CLASSES
 from reports.page import page, sparkline
@@ -292,3 +294,16 @@ def test_what_a_run_need_not_have_is_shown_where_it_does(folder: Path, report: d
 @pytest.mark.parametrize(("values", "points"), [([], ""), ([0], "2.0,21.0"), ([1, None, 2], "2.0,12.0 118.0,3.0")])
 def test_sparklines(values: list[float | None], points: str) -> None:
     assert sparkline(values) == points
+
+
+def test_what_is_too_large_for_a_page_is_said(
+    folder: Path, report: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reports.embedding, "LADDER", ((0.1, 16, 1.0),))
+    monkeypatch.setattr(reports.embedding, "BUDGET", 400)
+    monkeypatch.setattr(reports.page, "LONGEST_TEXT", 20)
+    html = page(folder, report)
+    left_out = html.count('"left_out":true')
+    assert 1 < left_out < 14
+    assert f"{left_out} pictures are left out; the run" in " ".join(html.split())
+    assert 'its first 20 characters</summary><pre tabindex="0">255 255 255\n0.3\n0\n3\n</pre>' in html

@@ -231,7 +231,7 @@ function showValues() {
     line.dataset.renderer = picture.renderer;
     if (!values) {
       name.prepend(element("span", { className: "swatch none" }));
-      line.append(element("td", { colSpan: 4, className: "quiet", textContent: picture.block ? "…" : picture.outcome.replaceAll("-", " "), title: picture.reason ?? "" }));
+      line.append(element("td", { colSpan: 4, className: "quiet", textContent: picture.block ? "…" : picture.left_out ? "left out for size" : picture.outcome.replaceAll("-", " "), title: picture.reason ?? "" }));
       return line;
     }
     const swatch = element("span", { className: "swatch" });
