@@ -131,6 +131,7 @@ def _viewer_picture(picture: dict[str, Any], embedded: Embedded) -> dict[str, An
         **{key: picture[key] for key in ("renderer", "title", "reason")},
         "outcome": outcome(picture),
         "left_out": _is_left_out(picture, embedded),
+        "against": picture.get("against"),
         "unexplained": picture["pixels"]["unexplained"] if compared else 0,
         "differing": picture["over"][f"{TOLERANCE:g}"] if compared else 0,
         "worst": picture.get("worst", []),

@@ -19,7 +19,9 @@ from reference.proof import Prover
 from reference.scene import Scene
 from reference.text import parse
 from reports.accounting import CLASSES, Reason, account
-from reports.metrics import TOLERANCE, Measurement, error_map, measure
+from reports.approvals import covered, find_approval, is_expired
+from reports.history import history
+from reports.metrics import SETTINGS, TOLERANCE, Measurement, error_map, measure
 from reports.raytree import ray_tree
 from reports.recording import read_run
 
@@ -35,12 +37,35 @@ def judge(folder: Path, progress: Callable[[str], None] = lambda text: None) -> 
     Returns the content of report.json. Raises InputError where the folder holds no run.
     """
     run = read_run(folder)
-    return {**run, "scenes": [_judge_scene(folder, entry, progress) for entry in run["scenes"]]}
+    scenes = [_judge_scene(folder, run["started"], entry, progress) for entry in run["scenes"] if entry["pictures"]]
+    results = {**run, "settings": SETTINGS, "scenes": scenes}
+    return {**results, "history": history(folder, results)}
 
 
-def _judge_scene(folder: Path, entry: dict[str, Any], progress: Callable[[str], None]) -> dict[str, Any]:
+def unexplained(folder: Path, entry: dict[str, Any], picture: dict[str, Any]) -> list[tuple[int, int]]:
+    """Row and column of every pixel of a recorded picture that nothing explains, largest error first."""
+    truth, scene = _truth(folder, entry, picture), _scene(entry)
+    if truth is None or picture["image"] is None:
+        return []
+    shape = {key: entry[key] for key in ("width", "height", "depth")}
+    levels = read_image(folder / f"{picture['image']}.exr")
+    places = _differing(error_map(truth, levels))
+    reasons: list[Reason | None] = [None] * len(places)
+    if scene:
+        reasons = account(Prover(scene, **shape), picture.get("limits") or {}, levels, places)
+    return [(row, column) for (row, column), reason in zip(places.tolist(), reasons, strict=True) if reason is None]
+
+
+def _truth(folder: Path, entry: dict[str, Any], picture: dict[str, Any]) -> NDArray[Any] | None:
+    """What a picture is compared with: the first of its scene, or, where it says `against`, that one."""
+    name = picture.get("against") or entry["pictures"][0]["renderer"]
+    found = next((other["image"] for other in entry["pictures"] if other["renderer"] == name), None)
+    return read_image(folder / f"{found}.exr") if found else None
+
+
+def _judge_scene(folder: Path, started: str, entry: dict[str, Any], progress: Callable[[str], None]) -> dict[str, Any]:
     reference, *others = entry["pictures"]
-    truth = read_image(folder / f"{reference['image']}.exr") if reference["image"] else None
+    truth = _truth(folder, entry, reference)
     scene = _scene(entry)
     shape = {"width": entry["width"], "height": entry["height"], "depth": entry["depth"]}
     prover = Prover(scene, **shape) if scene else None
@@ -48,11 +73,12 @@ def _judge_scene(folder: Path, entry: dict[str, Any], progress: Callable[[str], 
     comparisons = []
     for picture in others:
         progress(f"{entry['scene']}: {picture['renderer']}")
-        comparison = _compare(folder, truth, picture, prover)
+        right = _truth(folder, entry, picture) if picture.get("against") else truth
+        comparison = _compare(folder, right, picture, prover, find_approval(entry, picture["renderer"]), started)
         if scene and prover and prover.surfaces <= MANY:
             _tell_rays(scene, entry, comparison["worst"][:TREES], trees)
         comparisons.append(comparison)
-    facts = {key: value for key, value in entry.items() if key != "pictures"}
+    facts = {key: value for key, value in entry.items() if key not in ("pictures", "approvals")}
     seconds = reference["seconds"] if reference["trace_seconds"] is None else reference["trace_seconds"]
     return {**facts, "seconds": seconds, "reference": reference, "comparisons": comparisons}
 
@@ -83,9 +109,14 @@ def _tell_rays(
 
 
 def _compare(
-    folder: Path, truth: NDArray[Any] | None, picture: dict[str, Any], prover: Prover | None
+    folder: Path,
+    truth: NDArray[Any] | None,
+    picture: dict[str, Any],
+    prover: Prover | None,
+    approval: dict[str, Any] | None,
+    started: str,
 ) -> dict[str, Any]:
-    result = {
+    result: dict[str, Any] = {
         **picture,
         "verdict": None,
         "metrics": None,
@@ -112,14 +143,21 @@ def _compare(
     if prover:
         reasons = account(prover, limits, levels, places)
     pixels = _count(measured, reasons)
+    approved: set[tuple[int, int]] = set()
+    if approval:
+        left = [(row, column) for (row, column), why in zip(places.tolist(), reasons, strict=True) if why is None]
+        approved, expired = covered(approval, levels, left), is_expired(approval, started)
+        facts = {"because": approval["because"], "until": approval["until"]}
+        result["approval"] = {**facts, "expired": expired, "pixels": len(approved)}
+        approved = set() if expired else approved
     return {
         **result,
-        "verdict": "disagree" if pixels["unexplained"] else "agree",
+        "verdict": "disagree" if pixels["unexplained"] > len(approved) else "agree",
         "metrics": measured.metrics(),
         "places": {"ssim_min": measured.ssim_min_at, "max_error": measured.max_error_at},
         "pixels": pixels,
         "over": measured.over,
-        "worst": _worst(error, places, reasons),
+        "worst": _worst(error, places, reasons, approved),
         "difference": difference,
         "maps": maps,
     }
@@ -146,9 +184,15 @@ def _count(measured: Measurement, reasons: list[Reason | None]) -> dict[str, Any
     return {"total": measured.total, "agree": agree, "explained": explained, "unexplained": reasons.count(None)}
 
 
-def _worst(error: NDArray[np.float64], places: NDArray[np.intp], reasons: list[Reason | None]) -> list[dict[str, Any]]:
-    """The pixels that do not agree, those without a reason first."""
-    order = sorted(range(len(reasons)), key=lambda i: reasons[i] is not None)[:WORST]
+def _worst(
+    error: NDArray[np.float64],
+    places: NDArray[np.intp],
+    reasons: list[Reason | None],
+    approved: set[tuple[int, int]],
+) -> list[dict[str, Any]]:
+    """The pixels that do not agree, those without a reason first, and of them those first that nobody approved."""
+    accepted = [(row, column) in approved for row, column in places.tolist()]
+    order = sorted(range(len(reasons)), key=lambda i: (reasons[i] is not None, accepted[i]))[:WORST]
     return [
         {
             "column": int(places[i][1]),
@@ -156,6 +200,7 @@ def _worst(error: NDArray[np.float64], places: NDArray[np.intp], reasons: list[R
             "error": round(float(error[tuple(places[i])]), 3),
             "class": reason.kind if (reason := reasons[i]) else None,
             "evidence": reason.evidence if reason else None,
+            **({"approved": True} if accepted[i] else {}),
         }
         for i in order
     ]

@@ -7,6 +7,7 @@ const LARGEST_ZOOM = 128, VALUES_FROM = 52, LAYERS = 8;
 const SHAPES = {
   unexplained: ["○", "#ff5a4d"], "knife-edge": ["◇", "#ffc24a"], "document-window": ["□", "#5cc8ff"],
   "renderer-precision": ["△", "#d59bff"], "declared-limit": ["✕", "#7fe0a7"],
+  approved: ["◎", "#b9c4d0"],
 };
 const camera = { x: 0, y: 0, zoom: 1, fits: true };
 const layers = new Map();
@@ -194,6 +195,7 @@ function drawMark(pane, mark) {
   const [x, y] = toPane(pane, mark.column + 0.5, mark.row + 0.5), r = Math.max(7, camera.zoom * 0.5 + 6);
   const kind = kindOf(mark), path = new Path2D();
   if (kind === "unexplained") path.arc(x, y, r, 0, 7);
+  else if (kind === "approved") for (const part of [1, 0.6]) { path.moveTo(x + part * r, y); path.arc(x, y, part * r, 0, 7); }
   else if (kind === "document-window") path.rect(x - r * 0.85, y - r * 0.85, r * 1.7, r * 1.7);
   else if (kind === "declared-limit") {
     for (const side of [-1, 1]) { path.moveTo(x - r, y - side * r); path.lineTo(x - r / 3, y - side * r / 3); path.moveTo(x + r / 3, y + side * r / 3); path.lineTo(x + r, y + side * r); }

@@ -14,7 +14,8 @@ function element(tag, properties = {}, ...children) {
   return made;
 }
 
-const kindOf = (mark) => mark.class ?? "unexplained";
+const kindOf = (mark) => mark.class ?? (mark.approved ? "approved" : "unexplained");
+const APPROVED = "Nothing explains it, and somebody has approved it.";
 
 // A level with as many digits as the page carries.
 function written(value) {
@@ -35,6 +36,9 @@ function marks() {
 }
 
 const drawable = (scene) => scene.pictures.filter((picture) => picture.block);
+
+// The picture that another was compared with.
+const againstOf = (picture) => state.scene.pictures.find((other) => other.renderer === picture.against) ?? state.scene.pictures[0];
 
 function find(scene, renderer, otherwise) {
   return drawable(scene).find((picture) => picture.renderer === renderer) ?? otherwise;
@@ -78,7 +82,8 @@ function showAddress() {
 function openViewer(scene, renderer, pixel = "") {
   const [first] = drawable(data.scenes.find((one) => one.scene === scene));
   const b = first.renderer === renderer ? "" : renderer;
-  writeAddress({ ...Object.fromEntries(VIEW.map((name) => [name, ""])), view: scene, b, pixel, zoom: pixel && "24" }, true);
+  const a = data.scenes.find((one) => one.scene === scene).pictures.find((picture) => picture.renderer === renderer)?.against ?? "";
+  writeAddress({ ...Object.fromEntries(VIEW.map((name) => [name, ""])), view: scene, a, b, pixel, zoom: pixel && "24" }, true);
   showAddress();
 }
 
@@ -162,7 +167,7 @@ function showPanel() {
   const texts = {
     slider: [`A ${state.a.title}`, `B ${state.b.title}`], side: [`A ${state.a.title}`, `B ${state.b.title}`],
     blink: [state.flipped ? `B ${state.b.title}` : `A ${state.a.title}`, ""], difference: [`|${versus}|`, ""], signed: [versus, ""],
-  }[state.mode] ?? [map ? `${MODES[state.mode]}: ${map.title} against ${state.scene.pictures[0].title}` : "", ""];
+  }[state.mode] ?? [map ? `${MODES[state.mode]}: ${map.title} against ${againstOf(map).title}` : "", ""];
   [part(".label-a").textContent, part(".label-b").textContent] = texts;
   showLegend();
   showMarks();
@@ -187,7 +192,7 @@ function showMarks() {
     const box = element("input", { type: "checkbox", value: kind, checked: !state.hidden.has(kind) });
     const shape = element("span", { className: "shape", textContent: sign, ariaHidden: "true" });
     shape.style.setProperty("--mark", colour);
-    return element("label", { title: data.classes[kind] ?? "Nothing explains it: somebody is wrong." }, box, shape, ` ${kind} `, element("span", { className: "quiet", textContent: count }));
+    return element("label", { title: data.classes[kind] ?? (kind === "approved" ? APPROVED : "Nothing explains it: somebody is wrong.") }, box, shape, ` ${kind} `, element("span", { className: "quiet", textContent: count }));
   });
   const differing = state.b.differing || state.a.differing;
   const note = differing > all.length ? [element("p", { className: "quiet", textContent: `The worst ${all.length} of ${differing} pixels that differ are marked.` })] : [];
@@ -251,7 +256,7 @@ function showWhy(scene, column, row) {
   const parts = found.map(([picture, mark]) => element("p", {},
     element("strong", { textContent: picture.title }), ": ",
     element("span", { className: mark.class ? "" : "wrong", textContent: `${SHAPES[kindOf(mark)]?.[0] ?? ""} ${kindOf(mark)}` }),
-    mark.class ? `, ${mark.evidence}. ${data.classes[mark.class] ?? ""}` : ": nothing explains this colour; somebody is wrong."));
+    mark.class ? `, ${mark.evidence}. ${data.classes[mark.class] ?? ""}` : mark.approved ? `. ${APPROVED}` : ": nothing explains this colour; somebody is wrong."));
   const tree = found.map(([, mark]) => mark.raytree).find(Boolean);
   if (tree) {
     parts.push(element("details", { open: true }, element("summary", { textContent: `The rays of ${scene.pictures[0].title} behind it` }),
