@@ -313,7 +313,7 @@ FIRST_PICTURE = """async () => {
   while (document.querySelector(".wait").textContent) await new Promise((done) => setTimeout(done, 5));
   return performance.now() - start;
 }"""
-MARKERS = "unexplained,knife-edge,document-window,renderer-precision,declared-limit"
+MARKERS = "unexplained,knife-edge,document-window,renderer-precision,declared-limit,approved"
 LOOK = f"view=edges&a=native&b=mitsuba&hide={MARKERS}"
 
 
@@ -535,6 +535,35 @@ def test_rays_are_told_at_marked_pixels(page: Page) -> None:
         assert told[0] == f"column {column}, row {row}, convention exact"
     look(page, "view=edges&b=mitsuba&pixel=1,1")
     assert page.locator("aside .why pre").count() == 0
+
+
+def test_approved_pixels_and_pictures_against_others_than_the_reference(
+    browser: Browser, folder: Path, tmp_path: Path
+) -> None:
+    results = json.loads((folder / "report.json").read_text())
+    (scene,) = [scene for scene in results["scenes"] if scene["scene"] == "edges"]
+    wrong, other = scene["comparisons"]
+    wrong["worst"][0]["approved"] = True
+    wrong |= {"verdict": "agree", "against": "povray"}
+    wrong["approval"] = {"because": "known", "until": "2027-11-01", "expired": False, "pixels": 1}
+    (tmp_path / "report.html").write_text(drawn(folder, results), encoding="utf-8")
+    trouble: list[str] = []
+    page = opened(browser, tmp_path, trouble)
+    cell = page.locator(".matrix tr", has_text="edges").locator(".cell").first
+    assert cell.inner_text() == "✓ 1 approved"
+    row = page.locator(".comparisons tbody[data-scene=edges] tr[data-renderer=mitsuba]")
+    assert row.locator("td").nth(2).inner_text() == "✓ agree against Povray approved until 2027-11-01"
+    cell.click()
+    assert {key: entries(page)[key] for key in ("a", "b")} == {"a": "povray", "b": "mitsuba"}
+    page.wait_for_function("() => store.ready.size >= 3")
+    page.keyboard.press("n")
+    assert page.locator(".marks label").first.inner_text().split() == ["◎", "approved", "1"]
+    assert "◎ approved. Nothing explains it, and somebody has approved it." in page.locator("aside .why").inner_text()
+    page.keyboard.press("6")
+    page.wait_for_function("() => document.querySelector('.label-a').textContent.endsWith('against Povray')")
+    assert other["verdict"] == "agree"
+    page.close()
+    assert trouble == []
 
 
 def test_each_class_has_a_marker_that_can_be_hidden(page: Page) -> None:
