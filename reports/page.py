@@ -21,6 +21,7 @@ SIGNS = {"failed": "!", "disagree": "✗", "not-compared": "?", "not-installed":
 SCRIPTS = ("pixels.js", "colours.js", "address.js", "overview.js", "stage.js", "viewer.js", "keys.js")
 SHOWN_RUNS = 30  # of the history
 SPARKLINE = (120, 24)  # pixels
+LARGER = 400  # pixels: a term of the reference
 LONGEST_TEXT = 100_000  # characters of a scene file
 
 
@@ -47,6 +48,7 @@ def page(folder: Path, results: dict[str, Any]) -> str:
         outcome=outcome,
         signs=SIGNS,
         thumbnail=cache(lambda name: thumbnail(folder, name)),
+        larger=lambda name: thumbnail(folder, name, LARGER),
         longest=LONGEST_TEXT,
         left_out=sum(_is_left_out(picture, embedded) for scene in scenes for picture in _pictures(scene)),
         settings=SETTINGS,
@@ -118,11 +120,18 @@ def _viewer_data(scenes: list[dict[str, Any]], embedded: Embedded) -> dict[str, 
             {
                 **{key: scene[key] for key in ("scene", "path", "width", "height", "depth", "convention")},
                 "offsets": embedded.offsets.get(scene["scene"]),
+                "rays": _rays(scene),
                 "pictures": [_viewer_picture(picture, embedded) for picture in _pictures(scene)],
             }
             for scene in scenes
         ],
     }
+
+
+def _rays(scene: dict[str, Any]) -> dict[str, list[str]]:
+    """The ray trees that are stored, by column and row: once, however many renderers differ there."""
+    pixels = [pixel for picture in scene["comparisons"] for pixel in picture["worst"] if "raytree" in pixel]
+    return {f"{pixel['column']},{pixel['row']}": pixel["raytree"] for pixel in pixels}
 
 
 def _viewer_picture(picture: dict[str, Any], embedded: Embedded) -> dict[str, Any]:
@@ -134,7 +143,7 @@ def _viewer_picture(picture: dict[str, Any], embedded: Embedded) -> dict[str, An
         "against": picture.get("against"),
         "unexplained": picture["pixels"]["unexplained"] if compared else 0,
         "differing": picture["over"][f"{TOLERANCE:g}"] if compared else 0,
-        "worst": picture.get("worst", []),
+        "worst": [{key: pixel[key] for key in pixel if key != "raytree"} for pixel in picture.get("worst", [])],
         "block": embedded.names.get(picture["image"]),
         "base": embedded.bases.get(picture["image"]),
         "maps": {

@@ -282,7 +282,7 @@ def test_what_a_run_need_not_have_is_shown_where_it_does(folder: Path, report: d
         in html
     )
     assert "approved until 2027-11-01</span>, because seen by all" in html
-    assert '"raytree":["camera ray","  hits \\u003c/script\\u003e\\u003cb\\u003eplane 1\\u003c/b\\u003e"]' in html
+    assert '"90,30":["camera ray","  hits \\u003c/script\\u003e\\u003cb\\u003eplane 1\\u003c/b\\u003e"]' in html
     assert 'Povray: <span class="wrong">3 pixels over 0.5</span>, at most 20' in html
     assert "Mitsuba: agrees, at most 0.25" in html
     assert page(folder, results) == html

@@ -257,7 +257,7 @@ function showWhy(scene, column, row) {
     element("strong", { textContent: picture.title }), ": ",
     element("span", { className: mark.class ? "" : "wrong", textContent: `${SHAPES[kindOf(mark)]?.[0] ?? ""} ${kindOf(mark)}` }),
     mark.class ? `, ${mark.evidence}. ${data.classes[mark.class] ?? ""}` : mark.approved ? `. ${APPROVED}` : ": nothing explains this colour; somebody is wrong."));
-  const tree = found.map(([, mark]) => mark.raytree).find(Boolean);
+  const tree = scene.rays[`${column},${row}`];
   if (tree) {
     parts.push(element("details", { open: true }, element("summary", { textContent: `The rays of ${scene.pictures[0].title} behind it` }),
       element("pre", { tabIndex: 0, textContent: tree.join("\n") })));
