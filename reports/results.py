@@ -48,12 +48,17 @@ def unexplained(folder: Path, entry: dict[str, Any], picture: dict[str, Any]) ->
     if truth is None or picture["image"] is None:
         return []
     shape = {key: entry[key] for key in ("width", "height", "depth")}
-    levels = read_image(folder / f"{picture['image']}.exr")
+    levels = read_levels(folder, picture)
     places = _differing(error_map(truth, levels))
     reasons: list[Reason | None] = [None] * len(places)
     if scene:
         reasons = account(Prover(scene, **shape), picture.get("limits") or {}, levels, places)
     return [(row, column) for (row, column), reason in zip(places.tolist(), reasons, strict=True) if reason is None]
+
+
+def read_levels(folder: Path, picture: dict[str, Any]) -> NDArray[Any]:
+    """A recorded picture, in levels. Raises InputError where it is missing."""
+    return read_image(folder / f"{picture['image']}.exr")
 
 
 def _truth(folder: Path, entry: dict[str, Any], picture: dict[str, Any]) -> NDArray[Any] | None:
@@ -130,7 +135,7 @@ def _compare(
         return {**result, "reason": "not compared: the reference is missing"}
     if truth is None or picture["image"] is None:
         return result
-    levels = read_image(folder / f"{picture['image']}.exr")
+    levels = read_levels(folder, picture)
     measured = measure(truth, levels)
     error = error_map(truth, levels)
     difference = f"{picture['image']}-difference"
