@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 from functools import cache
 from importlib import resources
@@ -34,7 +36,7 @@ def page(folder: Path, results: dict[str, Any]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": number, "seconds": seconds, "sparkline": sparkline}
+    environment.filters |= {"number": number, "seconds": seconds, "sparkline": sparkline, "hash": content_hash}
     scenes = [{**scene, "comparisons": sorted(scene["comparisons"], key=_badness)} for scene in results["scenes"]]
     scenes.sort(key=lambda scene: min(map(_badness, _pictures(scene))))
     embedded = embed(folder, scenes)
@@ -167,6 +169,11 @@ def _badness(picture: dict[str, Any]) -> tuple[int, int, float]:
 
 def _asset(name: str) -> str:
     return resources.files("reports").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def content_hash(text: str) -> str:
+    """How a content security policy names a script or style, so that a browser runs no other."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
 
 
 def number(value: float | None) -> str:

@@ -879,6 +879,14 @@ def test_nothing_leaves_the_file(browser: Browser, folder: Path) -> None:
     assert trouble == []
     policy = page.locator("meta[http-equiv=Content-Security-Policy]").get_attribute("content") or ""
     assert re.match(r"default-src 'none'; img-src data:;", policy)
+    assert "unsafe" not in policy
+    injected = """() => {
+      const script = document.createElement("script");
+      script.textContent = "window.injected = true";
+      document.body.append(script);
+      return window.injected ?? false;
+    }"""
+    assert page.evaluate(injected) is False
     refused = page.evaluate("fetch('https://example.org/').then(() => 'sent', () => 'refused')")
     assert refused == "refused"
     page.close()
@@ -903,6 +911,7 @@ def test_large_pictures_are_there_at_once(browser: Browser, tmp_path: Path) -> N
     (tmp_path / "report.html").write_text(drawn(tmp_path, results), encoding="utf-8")
     trouble: list[str] = []
     page = opened(browser, tmp_path, trouble)
+    page.wait_for_function("() => performance.getEntriesByName('first-contentful-paint').length")
     paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
     viewed = page.evaluate(FIRST_PICTURE)
     assert seen(page, 30, 900) == truncated(truth[900, 30])
