@@ -8,7 +8,7 @@ import re
 import signal
 import sys
 import warnings
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -238,6 +238,8 @@ def export(scene: str, output: Path, to: Sequence[str], size: Size, depth: int, 
 @size_option
 @depth_option
 @click.option("--timeout", type=click.FloatRange(min=1), default=600.0, help="Seconds that a renderer may take.")
+@click.option("--terms", "by_term", is_flag=True, help="Compare ambient, direct and mirrored light one by one, too.")
+@click.option("--baseline", type=PATH, metavar="DIR", help="Compare the native pictures with those of an earlier run.")
 @quiet_option
 @verbose_option
 def check(
@@ -247,6 +249,8 @@ def check(
     size: Size,
     depth: int,
     timeout: float,
+    by_term: bool,
+    baseline: Path | None,
     quiet: bool,
     verbose: bool,
 ) -> None:
@@ -255,10 +259,15 @@ def check(
     \b
     crossray check
     crossray check homework.txt --with povray --out out/homework
+    crossray check --baseline out/before --out out/after
     """
     from reference.text import dump
+    from reports.approvals import approvals_path, read_approvals
+    from reports.baseline import read_baseline
+    from reports.history import remember
     from reports.recording import Recording
     from reports.terminal import progress_lines, summary_lines
+    from reports.terms import VARIED, record_comparisons, record_terms, variants
     from reports.writing import write_reports
     from translator.concurrency import Job, run_jobs
     from translator.registry import TRUTH, check_names, renderer_names
@@ -269,8 +278,15 @@ def check(
     loaded = [(path, _load(path, quiet)) for path in scenes or _examples()]
     settings = _settings(size, depth)
     limits = {name: max(timeout, SHORTEST_PROOF) if name == TRUTH else timeout for name in (TRUTH, *names)}
-    jobs = [Job(name, path, scene, settings, limit) for path, scene in loaded for name, limit in limits.items()]
-    steps = dict.fromkeys(limits, len(loaded)) | {"comparing": len(loaded) * len(names)}
+    texts = [(path, dump(scene)) for path, scene in loaded]
+    approved = [read_approvals(approvals_path(path)) if path != "-" else [] for path, _ in loaded]
+    earlier = read_baseline(baseline, texts, size.width, size.height, depth) if baseline else [None] * len(loaded)
+    jobs = []
+    for path, scene in loaded:
+        jobs += [Job(name, path, scene, settings, limit) for name, limit in limits.items()]
+        for term, variant in variants(scene).items() if by_term else ():
+            jobs += [Job(name, f"{path}, {term} alone", variant, settings, timeout) for name in names]
+    steps = Counter(job.renderer for job in jobs) | {"comparing": len(loaded) * (len(names) + bool(baseline))}
     run = Recording(out, _version())
     with progress_lines(quiet, verbose, steps) as show:
 
@@ -279,15 +295,67 @@ def check(
             show(job.renderer, what, 1 if outcome else 0)
 
         with closing(run_jobs(jobs, report)) as outcomes:
-            for path, scene in loaded:
-                entry = run.add_scene(path, size.width, size.height, depth=depth, convention="exact", text=dump(scene))
+            for (path, text), (_, scene), accepted, before in zip(texts, loaded, approved, earlier, strict=True):
+                facts = {"depth": depth, "convention": "exact", "text": text, "approvals": accepted}
+                entry = run.add_scene(path, size.width, size.height, **facts)
+                full = {}
                 for outcome in islice(outcomes, len(limits)):
-                    facts = {key: value for key, value in vars(outcome).items() if key != "picture"}
-                    run.add_picture(entry, facts, outcome.picture)
+                    full[outcome.renderer] = outcome.picture
+                    run.add_picture(entry, {k: v for k, v in vars(outcome).items() if k != "picture"}, outcome.picture)
+                if before:
+                    run.add_picture(entry, *before)
+                terms = record_terms(run, entry, scene)
+                if by_term:
+                    alone = [{job.renderer: job for job in islice(outcomes, len(names))} for _ in VARIED]
+                    for name in names:
+                        pictures = {term: by_name[name].picture for term, by_name in zip(VARIED, alone, strict=True)}
+                        about = (name, alone[0][name].title)
+                        record_comparisons(run, entry, terms, about, full[name], pictures)
         results = write_reports(out, lambda text: show("comparing", text, 1))
+        remember(out, results)
     _print("\n".join(summary_lines(results)))
     _say(f"{out / 'report.html'}", quiet)
     raise click.exceptions.Exit(_exit_code(results, required))
+
+
+@app.command()
+@scene_argument
+@click.argument("renderer", metavar="RENDERER")
+@click.option("--because", required=True, metavar="TEXT", help="Why the difference is accepted.")
+@click.option("--until", required=True, metavar="YYYY-MM-DD", help="The last day on which it is.")
+@click.option("--out", type=PATH, default=Path("out"), help="The folder of the run that has the difference.")
+@quiet_option
+@verbose_option
+def approve(scene: str, renderer: str, because: str, until: str, out: Path, quiet: bool, verbose: bool) -> None:
+    """Accept the pixels of a renderer that a check found unexplained, in a file beside the scene.
+
+    \b
+    crossray approve homework.txt povray --because "known, issue 12" --until 2027-01-31
+    """
+    from datetime import date
+
+    from reference.text import dump
+    from reports.approvals import approvals_path, approve, read_approvals
+    from reports.recording import find_picture, read_run, write_run
+    from reports.results import read_levels, unexplained
+    from reports.writing import write_reports
+
+    try:
+        last = date.fromisoformat(until)
+    except ValueError as error:
+        raise click.BadParameter(f"expected a day like 2027-01-31, found {until!r}", param_hint="--until") from error
+    if last < date.today():
+        raise click.BadParameter(f"expected a day that is not over, found {until}", param_hint="--until")
+    path = approvals_path(scene)
+    run = read_run(out)
+    entry, picture = find_picture(out, run, dump(_load(scene, quiet)), renderer)
+    places = unexplained(out, entry, picture)
+    number = approve(path, entry, renderer, read_levels(out, picture), places, because=because, until=last)
+    entry["approvals"] = read_approvals(path)
+    write_run(out, run)
+    write_reports(out)
+    _print(f"{path}: {number} pixels of {renderer} approved until {last}")
+    _say(f"{out / 'report.html'}", quiet)
 
 
 @app.command()

@@ -35,14 +35,23 @@ def _add_case(suite: ElementTree.Element, scene: str, picture: dict[str, Any]) -
         name=_clean(picture["renderer"]),
         time=f"{picture['seconds'] or 0:.3f}",
     )
-    if explained := (picture.get("pixels") or {}).get("explained"):
+    if facts := _facts(picture):
         properties = ElementTree.SubElement(case, "properties")
-        for name, number in explained.items():
-            ElementTree.SubElement(properties, "property", name=name, value=str(number))
+        for name, value in facts.items():
+            ElementTree.SubElement(properties, "property", name=name, value=_clean(value))
     kind, message = _finding(picture)
     if kind:
         ElementTree.SubElement(case, kind, message=_clean(message)).text = _clean(picture["log"])
     return kind
+
+
+def _facts(picture: dict[str, Any]) -> dict[str, str]:
+    """The pixels of each class, and what is approved."""
+    facts = {name: str(number) for name, number in ((picture.get("pixels") or {}).get("explained") or {}).items()}
+    if approval := picture.get("approval"):
+        word = "expired" if approval["expired"] else "until"
+        facts["approved"] = f"{approval['pixels']} pixels, {word} {approval['until']}: {approval['because']}"
+    return facts
 
 
 def _finding(picture: dict[str, Any]) -> tuple[str | None, str]:
@@ -54,7 +63,13 @@ def _finding(picture: dict[str, Any]) -> tuple[str | None, str]:
         return "skipped", picture["reason"]
     if picture.get("verdict") == "disagree":
         pixels = picture["pixels"]
-        return "failure", f"{pixels['unexplained']} of {pixels['total']} pixels differ and are not explained"
+        message = f"{pixels['unexplained']} of {pixels['total']} pixels differ and are not explained"
+        approval = picture.get("approval")
+        if approval and approval["expired"]:
+            message += f"; {approval['pixels']} of them were approved until {approval['until']}"
+        elif approval:
+            message += f"; {approval['pixels']} of them are approved"
+        return "failure", message
     return None, ""
 
 

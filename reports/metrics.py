@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -19,11 +19,16 @@ SSIM_WINDOW = 11  # pixels: Gaussian weights of sigma 1.5, cut at 3.5 sigma
 SETTINGS = {
     "ssim": "Wang et al. 2004: Gaussian weights, sigma 1.5, population covariance, data range 1, mean over RGB. "
     "Its mean hides single wrong pixels, and harmless resampling lowers it more than a missing highlight does.",
-    "ssim_min": "The smallest value of the SSIM map, averaged over RGB: the worst 11 x 11 neighbourhood.",
-    "psnr": "20 log10(255 / RMSE), in decibels; empty where the pictures are equal.",
-    "rmse": "Root mean square error over all pixels and channels, in levels.",
-    "flip": "Mean LDR-FLIP at 67 pixels per degree, levels / 255 taken as sRGB. Its mean hides small bugs.",
-    "max_error": "The largest error of any channel of any pixel, in levels.",
+    "ssim_min": "The smallest value of the SSIM map, averaged over RGB: the worst 11 x 11 neighbourhood. "
+    "It names a place, not a size: a faint edge in a dark corner can lower it more than a wrong light elsewhere.",
+    "psnr": "20 log10(255 / RMSE), in decibels; empty where the pictures are equal. "
+    "One number for the whole picture: ten wrong pixels of a million leave it high.",
+    "rmse": "Root mean square error over all pixels and channels, in levels. Blind to where the error is, "
+    "and to whether many pixels are a little wrong or a few very much.",
+    "flip": "Mean LDR-FLIP at 67 pixels per degree, levels / 255 taken as sRGB. Its mean hides small bugs; its map "
+    "shows what an eye would see at that distance, not what is wrong.",
+    "max_error": "The largest error of any channel of any pixel, in levels. It tells neither how many "
+    "pixels are wrong nor whether anybody is at fault: a knife edge can have a large one.",
 }
 
 
@@ -41,6 +46,9 @@ class Measurement:
     max_error_at: Place
     total: int
     over: dict[str, int]  # pixels whose error exceeds that many levels
+    maps: dict[str, NDArray[np.float64]] = field(
+        default_factory=dict, compare=False
+    )  # by metric: 1 - SSIM (0..2), FLIP (0..1)
 
     def metrics(self) -> dict[str, float | None]:
         """The six numbers by the names of the report."""
@@ -70,24 +78,28 @@ def measure(reference: Picture, picture: Picture) -> Measurement:
     a, b = np.where(unknown, 0, a), np.where(unknown, 1, b)  # what is not a number is as wrong as can be
     error = error_map(reference, picture)
     rmse = float(np.sqrt(np.mean(np.square(a - b)))) * 255
-    ssim, ssim_min, ssim_min_at = _ssim(a, b)
+    ssim, similarity = _ssim(a, b)
+    flip, flip_map = _flip(a, b)
+    found = {"ssim": None if similarity is None else 1 - similarity, "flip": flip_map}
     return Measurement(
         ssim=ssim,
-        ssim_min=ssim_min,
-        ssim_min_at=ssim_min_at,
+        ssim_min=None if similarity is None else float(similarity.min()),
+        ssim_min_at=None if similarity is None else _place(similarity, int(similarity.argmin())),
         psnr=20 * math.log10(255 / rmse) if rmse else None,
         rmse=rmse,
-        flip=_flip(a, b),
+        flip=flip,
         max_error=float(error.max()),
         max_error_at=_place(error, int(error.argmax())),
         total=error.size,
         over={f"{level:g}": int(np.count_nonzero(error > level)) for level in THRESHOLDS},
+        maps={name: values for name, values in found.items() if values is not None},
     )
 
 
-def _ssim(a: Picture, b: Picture) -> tuple[float | None, float | None, Place | None]:
+def _ssim(a: Picture, b: Picture) -> tuple[float | None, NDArray[np.float64] | None]:
+    """The mean, and the map averaged over RGB."""
     if min(a.shape[:2]) < SSIM_WINDOW:
-        return None, None, None
+        return None, None
     from skimage.metrics import structural_similarity
 
     mean, full = structural_similarity(
@@ -100,18 +112,18 @@ def _ssim(a: Picture, b: Picture) -> tuple[float | None, float | None, Place | N
         channel_axis=-1,
         full=True,
     )
-    local = full.mean(axis=-1)
-    return float(mean), float(local.min()), _place(local, int(local.argmin()))
+    return float(mean), full.mean(axis=-1)
 
 
-def _flip(a: Picture, b: Picture) -> float | None:
+def _flip(a: Picture, b: Picture) -> tuple[float | None, NDArray[np.float64] | None]:
+    """The mean, and the map."""
     import flip_evaluator
 
     if min(a.shape[:2]) < SSIM_WINDOW:
-        return None
+        return None, None
     pictures = [np.ascontiguousarray(picture, np.float32) for picture in (a, b)]
-    _, mean, _ = flip_evaluator.evaluate(*pictures, "LDR", applyMagma=False)
-    return float(mean)
+    local, mean, _ = flip_evaluator.evaluate(*pictures, "LDR", applyMagma=False)
+    return float(mean), local[..., 0].astype(np.float64)
 
 
 def _place(array: NDArray[np.float64], index: int) -> Place:

@@ -62,23 +62,26 @@ class Recording:
         entry["pictures"].append({**facts, "image": image})
         self._save()
 
+    def add_terms(self, entry: dict[str, Any], found: Mapping[str, tuple[str, NDArray[np.floating[Any]]]]) -> None:
+        """Record the reference's terms: by name a title and a picture, an 8 bit PNG and a linear EXR."""
+        entry["terms"] = []
+        for name, (title, levels) in found.items():
+            image = f"{IMAGES}/{slug(entry['scene'])}/term-{slug(name)}"
+            for ending in (".exr", ".png"):
+                write_image(self.folder / (image + ending), levels)
+            entry["terms"].append({"name": name, "title": title, "image": image, "comparisons": []})
+        self._save()
+
+    def add_term_comparison(self, entry: dict[str, Any], name: str, facts: Mapping[str, Any]) -> None:
+        """Record how a renderer's term compares with the reference's."""
+        for term in entry["terms"]:
+            if term["name"] == name:
+                term["comparisons"].append(dict(facts))
+        self._save()
+
     def picture_file(self, name: str, path: Path) -> dict[str, Any]:
         """The facts of a picture that nobody rendered here."""
-        return {
-            "renderer": name,
-            "title": path.name,
-            "status": "rendered",
-            "version": None,
-            "reason": None,
-            "seconds": None,
-            "trace_seconds": None,
-            "command": "",
-            "log": "",
-            "notes": [],
-            "limits": {},
-            "summary": None,
-            "threads": None,
-        }
+        return unrendered(name, path.name)
 
     def _unique(self, name: str) -> str:
         taken = {slug(entry["scene"]) for entry in self.data["scenes"]}
@@ -86,7 +89,31 @@ class Recording:
         return next(candidate for candidate in names if slug(candidate) not in taken)
 
     def _save(self) -> None:
-        write_text(self.folder / RUN, json.dumps(self.data, indent=1, allow_nan=False) + "\n")
+        write_run(self.folder, self.data)
+
+
+def unrendered(renderer: str, title: str) -> dict[str, Any]:
+    """The facts of a picture that nobody rendered here."""
+    return {
+        "renderer": renderer,
+        "title": title,
+        "status": "rendered",
+        "version": None,
+        "reason": None,
+        "seconds": None,
+        "trace_seconds": None,
+        "command": "",
+        "log": "",
+        "notes": [],
+        "limits": {},
+        "summary": None,
+        "threads": None,
+    }
+
+
+def write_run(folder: Path, run: dict[str, Any]) -> None:
+    """Replace the record in a run's folder. Raises OutputError."""
+    write_text(folder / RUN, json.dumps(run, indent=1, allow_nan=False) + "\n")
 
 
 def read_run(folder: Path) -> dict[str, Any]:
@@ -95,7 +122,21 @@ def read_run(folder: Path) -> dict[str, Any]:
         run: dict[str, Any] = json.loads((folder / RUN).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{folder / RUN}:1:1: expected the record of a run, found {error}") from error
+    if not isinstance(run, dict) or not isinstance(run.get("scenes"), list):
+        raise InputError(f"{folder / RUN}:1:1: expected the record of a run, found something else")
     return run
+
+
+def find_picture(folder: Path, run: dict[str, Any], text: str, renderer: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The entries of the scene with that text and of a renderer's picture of it. Raises InputError where missing."""
+    place = f"{folder / RUN}:1:1"
+    entry = next((entry for entry in run["scenes"] if entry["text"] == text), None)
+    if entry is None:
+        raise InputError(f"{place}: expected the scene as it is now, found it changed or not checked; check it again")
+    picture = next((picture for picture in entry["pictures"] if picture["renderer"] == renderer), None)
+    if picture is None or picture["image"] is None:
+        raise InputError(f"{place}: expected a picture by {renderer}, found none")
+    return entry, picture
 
 
 def slug(name: str) -> str:

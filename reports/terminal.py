@@ -27,7 +27,11 @@ def _finding(picture: dict[str, Any]) -> str:
     pixels = picture["pixels"]
     explained = "".join(f", {number} {kind}" for kind, number in pixels["explained"].items())
     largest = f"largest error {picture['metrics']['max_error']:.3g} levels"
-    return f"{pixels['unexplained']} of {pixels['total']} pixels unexplained{explained}; {largest}"
+    approved = ""
+    if approval := picture.get("approval"):
+        word = "approval expired" if approval["expired"] else "approved until"
+        approved = f", {approval['pixels']} {word} {approval['until']}"
+    return f"{pixels['unexplained']} of {pixels['total']} pixels unexplained{approved}{explained}; {largest}"
 
 
 @contextmanager

@@ -11,15 +11,17 @@ from reference.files import write_text
 from reports.junit import junit
 from reports.page import page
 from reports.results import judge
+from reports.summary import summary
 
 
 def write_reports(folder: Path, progress: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
-    """Write report.json, junit.xml and report.html into the folder of a run; returns the content of report.json.
+    """Write report.json, junit.xml, summary.md and report.html into a run's folder; returns the content of the first.
 
     Raises InputError where the folder holds no run and OutputError where it cannot be written.
     """
     results = judge(folder, progress)
     write_text(folder / "report.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
     write_text(folder / "junit.xml", junit(results))
+    write_text(folder / "summary.md", summary(results))
     write_text(folder / "report.html", page(folder, results))
     return results

@@ -1,5 +1,6 @@
 """The three reports of one run."""
 
+import copy
 import json
 import shutil
 from html.parser import HTMLParser
@@ -12,8 +13,11 @@ import pytest
 from markupsafe import escape
 from recorded import EDGE, GREY, HEIGHT, NAME, NEAR, WIDTH, altered, facts, record, record_everything
 
+import reports.embedding
+import reports.page
 from reference.image import read_image
 from reports.accounting import CLASSES
+from reports.page import page, sparkline
 from reports.terminal import summary_lines
 from reports.writing import write_reports
 
@@ -116,6 +120,15 @@ def test_explained_pixels_are_listed_with_their_evidence_after_the_others(report
     ]
 
 
+def test_the_worst_pixels_have_their_rays_told_once_for_all(report: dict[str, Any]) -> None:
+    wrong, agreeing = (compared(report, renderer)["worst"] for renderer in ("mitsuba", "povray"))
+    for pixel in [*wrong, *agreeing]:
+        assert pixel["raytree"][0] == f"column {pixel['column']}, row {pixel['row']}, convention exact"
+        assert pixel["raytree"][-1].startswith("proof    ")
+    assert "knife edge" in wrong[-1]["raytree"][-1]
+    assert wrong[1]["raytree"] == agreeing[0]["raytree"]
+
+
 def test_terminal_lines_count_explained_pixels(report: dict[str, Any]) -> None:
     lines = [line for line in summary_lines(report) if line.startswith("edges")]
     explained = "3 knife-edge, 1 document-window; largest error 93.6 levels"
@@ -190,9 +203,11 @@ def test_page_needs_nothing_else_and_nothing_is_injected(folder: Path) -> None:
     for tag, attributes in elements.found:
         assert tag not in ("link", "iframe", "object", "embed", "base", "b"), tag
         assert not [name for name in attributes if name.startswith("on")]
-        assert (attributes.get("src") or "data:image/png;base64,").startswith("data:image/png;base64,")
+        assert (attributes.get("src") or "data:image/jpeg;base64,").startswith("data:image/jpeg;base64,")
         assert (attributes.get("href") or "#").startswith("#")
-    assert [tag for tag, _ in elements.found].count("script") == 1
+    scripts = [attributes.get("type") for tag, attributes in elements.found if tag == "script"]
+    assert scripts.count(None) == scripts.count("application/json") == 1
+    assert set(scripts) == {None, "application/json", "application/octet-stream"}
     assert "url(" not in text
     assert "@import" not in text
     assert "{{ 7 * 7 }}" in text
@@ -200,7 +215,10 @@ def test_page_needs_nothing_else_and_nothing_is_injected(folder: Path) -> None:
 
 def test_page_records_how_each_picture_was_drawn(folder: Path) -> None:
     html = (folder / "report.html").read_text(encoding="utf-8")
-    assert "<pre>povray &#39;&lt;b&gt;&#39; &amp;&amp; true</pre><p>Povray 1.2 &lt;b&gt;, on 2 cores.</p>" in html
+    assert (
+        '<pre tabindex="0">povray &#39;&lt;b&gt;&#39; &amp;&amp; true</pre><p>Povray 1.2 &lt;b&gt;, on 2 cores.</p>'
+        in html
+    )
     assert "Tachyon of unknown" not in html
 
 
@@ -243,3 +261,49 @@ def test_file_name_that_is_not_utf8(tmp_path: Path) -> None:
     record(tmp_path, {"caf\udce9.txt": [(facts("native"), GREY)]})
     assert (tmp_path / "report.html").read_text(encoding="utf-8")
     assert (tmp_path / "junit.xml").read_text(encoding="utf-8")
+
+
+def test_what_a_run_need_not_have_is_shown_where_it_does(folder: Path, report: dict[str, Any]) -> None:
+    """History, approvals, terms and ray trees."""
+    results = copy.deepcopy(report)
+    results["history"] = [{"unexplained": number, "seconds": 2.0 * number} for number in (3, 0, 6)]
+    (scene,) = [scene for scene in results["scenes"] if scene["scene"] == "edges"]
+    wrong, other = scene["comparisons"]
+    wrong["approval"] = {"because": "a known <b>limit</b>", "until": "2026-11-01", "expired": True}
+    other["approval"] = {"because": "seen by all", "until": "2027-11-01", "expired": False}
+    wrong["worst"][0]["raytree"] = ["camera ray", "  hits </script><b>plane 1</b>"]
+    compared = [{"title": "Povray", "over": 3, "max_error": 20.0}, {"title": "Mitsuba", "over": 0, "max_error": 0.25}]
+    scene["terms"] = [{"title": "ambient", "image": scene["reference"]["image"], "comparisons": compared}]
+    html = page(folder, results)
+    assert html.count('points="2.0,12.0 60.0,21.0 118.0,3.0"') == 2
+    assert "Unexplained pixels of the last 3 runs: 3, 0, 6" in html
+    assert (
+        '<span class="approval expired" title="a known &lt;b&gt;limit&lt;/b&gt;">approval expired 2026-11-01</span>'
+        in html
+    )
+    assert "approved until 2027-11-01</span>, because seen by all" in html
+    assert '"90,30":["camera ray","  hits \\u003c/script\\u003e\\u003cb\\u003eplane 1\\u003c/b\\u003e"]' in html
+    assert 'Povray: <span class="wrong">3 pixels over 0.5</span>, at most 20' in html
+    assert "Mitsuba: agrees, at most 0.25" in html
+    assert page(folder, results) == html
+    for absent in ("Unexplained pixels of the last", "term by term", 'class="approval'):
+        assert absent in html
+        assert absent not in page(folder, report)
+
+
+@pytest.mark.parametrize(("values", "points"), [([], ""), ([0], "2.0,21.0"), ([1, None, 2], "2.0,12.0 118.0,3.0")])
+def test_sparklines(values: list[float | None], points: str) -> None:
+    assert sparkline(values) == points
+
+
+def test_what_is_too_large_for_a_page_is_said(
+    folder: Path, report: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reports.embedding, "LADDER", ((0.1, 16, 1.0),))
+    monkeypatch.setattr(reports.embedding, "BUDGET", 400)
+    monkeypatch.setattr(reports.page, "LONGEST_TEXT", 20)
+    html = page(folder, report)
+    left_out = html.count('"left_out":true')
+    assert 1 < left_out < 14
+    assert f"{left_out} pictures are left out; the run" in " ".join(html.split())
+    assert 'its first 20 characters</summary><pre tabindex="0">255 255 255\n0.3\n0\n3\n</pre>' in html
