@@ -110,7 +110,7 @@ def grade(
         "scenes": [{"scene": name, "path": path} for name, path in assignment.paths.items()],
         "depth": assignment.depth,
         "pictures": records,
-        "students": list(_students(records)),
+        "students": list(students_of(records)),
         "mistakes": mistakes(records),
         "ignored": [{"path": shown(path), "reason": reason} for path, reason in collection.ignored],
     }
@@ -118,7 +118,7 @@ def grade(
     return results
 
 
-def _students(pictures: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+def students_of(pictures: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
     """Every student's points, in order, and the name of the page in case that there are several."""
     places: dict[str, list[int]] = {}
     for place, picture in enumerate(pictures):

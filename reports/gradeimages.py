@@ -15,6 +15,8 @@ from reference.image import Picture, quantise
 
 AMPLIFIED = 8  # the difference picture: 32 levels are white
 THUMB, SMALL = 112, 224  # pixels a side
+QUALITIES = (85, 70, 50, 30, 10)  # of JPEG, the first that is small enough
+PIXELS_A_BYTE = 4
 ZOOM = 21  # pixels a side around the worst one
 
 
@@ -34,13 +36,16 @@ class Album:
         limit = self.side if side is None else side
         if max(image.size) > limit:
             image.thumbnail((limit, limit), Image.Resampling.BOX)
-        exact = side is None and self.exact
-        data = io.BytesIO()
-        if exact:
-            image.save(data, "PNG", optimize=False)
-        else:
-            image.save(data, "JPEG", quality=85 if side is None else 80, subsampling="4:2:0")
-        return self._write(f"{name}.{'png' if exact else 'jpg'}", data)
+        if side is None and self.exact:
+            data = io.BytesIO()
+            image.save(data, "PNG")
+            return self._write(f"{name}.png", data)
+        for quality in QUALITIES:
+            data = io.BytesIO()
+            image.save(data, "JPEG", quality=quality, subsampling="4:2:0")
+            if data.tell() <= limit * limit // PIXELS_A_BYTE:
+                break
+        return self._write(f"{name}.jpg", data)
 
     def save_difference(self, name: str, excess: NDArray[np.floating[Any]], side: int | None = None) -> str:
         """Likewise for an error in levels, amplified; scaled down, the worst pixel of each tile remains."""
