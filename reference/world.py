@@ -18,6 +18,7 @@ from reference.scene import EYE, LIGHT, SCREEN, Scene, holds_light
 from reference.tables import (
     MATERIAL,
     NOTHING,
+    PIXELS,
     UNROLLED,
     Path,
     Rows,
@@ -25,7 +26,9 @@ from reference.tables import (
     geometry,
     pixel_places,
     shading,
-    tiles,
+    tile_corners,
+    tile_places,
+    tiles_across,
     upload,
 )
 
@@ -82,22 +85,27 @@ class World(Rows):
 
     def draw(self, view: View, top: int, count: int) -> Number:
         """Red, green and blue of each pixel in turn, in `count` rows from `top` on."""
+        start = dr.opaque(self.Index, top)
         if self.tree is None:
-            return dr.ravel(self.colours(view, top, dr.arange(self.Index, count * view.width)))
-        pixel, place = tiles(self, view.width, count)
-        colour = self.colours(view, top, pixel)
-        dr.eval(colour)
-        return dr.ravel(dr.gather(self.Vector, colour, place))
+            pixel = dr.arange(self.Index, count * view.width)
+            return dr.ravel(self.colours(view, start, *pixel_places(self, view.width, pixel)))
+        inner = dr.arange(self.Index, tiles_across(view.width) * tiles_across(count) * PIXELS)
+        column, row = tile_places(tile_corners(self, view.width, inner // PIXELS), inner % PIXELS)
+        picture = dr.empty(self.Float, 3 * count * view.width)
+        inside = (column < dr.opaque(self.Index, view.width)) & (row < dr.opaque(self.Index, count))
+        pixel = dr.fma(row, dr.opaque(self.Index, view.width), column)
+        dr.scatter(picture, self.colours(view, start, column, row), pixel, inside)
+        return picture
 
-    def colours(self, view: View, top: int, pixel: Number) -> Vector:
-        """The colours of some pixels, which are counted from the start of row `top`."""
-        colour = _radiance(self, self.directions(view, top, pixel), dr.opaque(self.Index, view.depth))
-        return colour + dr.zeros(self.Vector, dr.width(pixel))  # one for each, be they all the same
+    def colours(self, view: View, top: Number, column: Number, row: Number) -> Vector:
+        """The colours of some pixels, whose rows are counted from row `top` on."""
+        colour = _radiance(self, self.directions(view, top, column, row), dr.opaque(self.Index, view.depth))
+        return colour + dr.zeros(self.Vector, dr.width(column))  # one for each, be they all the same
 
-    def directions(self, view: View, top: int, pixel: Number) -> Vector:
+    def directions(self, view: View, top: Number, column: Number, row: Number) -> Vector:
         """Directions of the camera's rays, not of unit length."""
-        size = self.uniform(2 * SCREEN / view.width), self.uniform(2 * SCREEN / view.height)
-        return self.Vector(*self.model.camera_direction(*pixel_places(self, view.width, top, pixel), *size))
+        size = (dr.opaque(self.Float, 2 * SCREEN / side) for side in (view.width, view.height))
+        return self.Vector(*self.model.camera_direction(self.Float(column), self.Float(row + top), *size))
 
 
 def _check_magnitudes(scene: Scene, spheres: NDArray[np.float64], types: Types) -> None:
