@@ -1,4 +1,4 @@
-"""Steps of the model as people get them wrong, and pictures that no step alone makes. `reference/mistakes.py` names them.
+"""Steps of the model as people get them wrong, and pictures that no step alone makes. `mistakes.py` names them.
 
 Steps are functions of Dr.Jit arrays, as in `reference/model.py`. Pictures are height x width x 3, in levels.
 """

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 LARGEST_SIDE = 4096  # pixels; larger pictures are refused before they are decoded
-FORMATS = ("PNG", "JPEG", "MPO", "BMP", "GIF", "TIFF", "PPM", "WEBP")  # Pillow's names
+FORMATS = ("PNG", "JPEG", "BMP", "GIF", "TIFF", "PPM", "WEBP")  # Pillow's names
 LOSSY = ("WEBP",)  # that tell nothing of their quality
 SUBSAMPLINGS = {0: "4:4:4", 1: "4:2:2", 2: "4:2:0"}  # Pillow's numbers
 EXR = b"v/1\x01"
@@ -66,6 +66,7 @@ def read_submission(path: str | Path) -> Submission:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what a damaged or enormous file says is said below
+            Image.init()
             with Image.open(path, formats=FORMATS) as image:
                 _check_size(path, *image.size)
                 facts = _facts(image, start)
