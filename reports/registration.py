@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from reports.envelope import Envelope
 
 TILE = 32  # pixels: what is independent of what
-LEAST = 0.15  # pixels that count
-SURE = 5.0  # standard errors
-TILES = 8  # that must hold edges
+LEAST = 0.3  # pixels that count
+SURE = 6.0  # standard errors
+TILES = 12  # that must hold edges
 
 
 @dataclass(frozen=True)

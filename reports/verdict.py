@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +26,10 @@ BLOB = 4  # pixels that may be so, connected
 ROUNDING = 1.0  # levels by which any 8-bit picture may differ
 SPECKS = 5e-4  # of all pixels that may be outside one by one
 MEAN = 0.6  # levels by which the mean of an area may differ beyond truncating and rounding
+LOSSY = 0.5  # levels more where the format is not exact
 AREA = 5e-3  # of all pixels, which such an area must have
 FLAT = 2.0  # levels: a pixel whose samples differ by no more is no edge
-SAME = 0.9  # of the edges' pixels that tell that pixels are sampled at their centres
+SAME = 0.4  # of the blocks with edges that tell that pixels are sampled at their centres
 CONNECTED = np.ones((3, 3), bool)
 LISTED = 50  # blobs at most
 
@@ -75,13 +77,13 @@ def judge(envelope: Envelope, submission: Submission) -> Verdict:
         raise InputError(f"expected a picture of {sizes[0]} pixels, found {sizes[1]}")
     right = quantise(envelope.centre)
     stored = [store(guess, facts) for guess in _guesses(envelope)]
-    exact = _is_exact(envelope, found, stored[0])
+    exact = _is_exact(envelope, found, stored[:2], _block(facts))
     low, high = _bounds(envelope, facts, stored, exact)
     outside = np.maximum(np.maximum(low - found, found - high), 0)
     wrong = outside.max(axis=-1) > OUTSIDE
     labels, sizes = _label(wrong)
     large = np.flatnonzero(sizes > (4 * BLOB if facts.lossy and exact else BLOB))
-    offset, area = _offset(envelope, found, stored)
+    offset, area = _offset(envelope, found, stored, facts)
     moved = displacement(envelope, found)
     reasons = {
         "blobs": large.size > 0,
@@ -113,16 +115,17 @@ def store(levels: Levels, facts: Facts) -> Levels:
 
 
 def _guesses(envelope: Envelope) -> list[Levels]:
-    """Pictures in 8 bit that are right: truncated, rounded, antialiased, and all but a level too dark."""
+    """Pictures in 8 bit that are right: truncated, rounded, antialiased; and a level too dark, a level too bright."""
     centre, middle = envelope.centre, (envelope.low + envelope.high) / 2
-    pictures = [centre, np.rint(centre), np.rint(middle), centre - 1]
+    pictures = [centre, np.rint(centre), np.rint(middle), centre - 1, centre + 1]
     return [quantise(picture).astype(np.float32) for picture in pictures]
 
 
-def _is_exact(envelope: Envelope, found: Levels, stored: Levels) -> bool:
-    """Whether the edges are, pixel by pixel, those of samples at the centres."""
-    edges = (envelope.high - envelope.low).max(axis=-1) > 2 * OUTSIDE
-    same = np.abs(found - stored).max(axis=-1) <= 2 * ROUNDING
+def _is_exact(envelope: Envelope, found: Levels, stored: list[Levels], side: int) -> bool:
+    """Whether the blocks that hold edges are, for a good part, those of samples at the centres."""
+    edges = _blocks((envelope.high - envelope.low).max(axis=-1), side) > 2 * OUTSIDE
+    off = [_blocks(np.abs(found - picture).max(axis=-1), side) for picture in stored]
+    same = np.min(off, axis=0) <= 2 * ROUNDING
     return bool(same[edges].mean() >= SAME) if edges.any() else bool(same.mean() >= SAME)
 
 
@@ -130,26 +133,37 @@ def _bounds(envelope: Envelope, facts: Facts, stored: list[Levels], exact: bool)
     """The least and the most of each channel that the file may hold."""
     if exact:
         slack = ROUNDING + (2 if facts.lossy else 0)
-        return stored[0] - slack, stored[0] + slack
+        centres = [stored[0], stored[1], *stored[3:]] if facts.lossy else stored[:1]
+        return np.min(centres, axis=0) - slack, np.max(centres, axis=0) + slack
     low, high = envelope.low - ROUNDING, envelope.high + ROUNDING
     if not facts.tables:
         slack = 24.0 if facts.lossy else 0.0
         return low - slack, high + slack
-    block = 16 if facts.subsampling not in (None, "4:4:4") else 8
     guesses = _guesses(envelope)
     error = np.max([np.abs(after - before) for after, before in zip(stored, guesses, strict=True)], axis=0)
-    slack = 1.25 * _over_blocks(error, block) + 2
+    slack = 1.25 * _over_blocks(error, _block(facts)) + 2
     return low - slack, high + slack
 
 
-def _over_blocks(error: Levels, side: int) -> Levels:
-    """The largest of each block and of what borders on it."""
+def _block(facts: Facts) -> int:
+    """The side of what a JPEG compresses at once, in pixels."""
+    return 8 if facts.subsampling in (None, "4:4:4") else 16
+
+
+def _over_blocks(error: NDArray[Any], side: int) -> NDArray[Any]:
+    """The largest of each block and of what borders on it, pixel by pixel."""
     height, width, _ = error.shape
-    padded = np.pad(error, ((0, -height % side), (0, -width % side), (0, 0)))
-    rows, columns = padded.shape[0] // side, padded.shape[1] // side
-    largest = padded.reshape(rows, side, columns, side, 3).max(axis=(1, 3))
+    largest = _blocks(error, side)
     spread = np.repeat(np.repeat(largest, side, axis=0), side, axis=1)[:height, :width]
     return np.asarray(ndimage.maximum_filter(spread, size=(5, 5, 1)))
+
+
+def _blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
+    """The largest of each block."""
+    height, width, *channels = values.shape
+    padded = np.pad(values, [(0, -height % side), (0, -width % side), *[(0, 0)] * len(channels)])
+    rows, columns = padded.shape[0] // side, padded.shape[1] // side
+    return np.asarray(padded.reshape(rows, side, columns, side, *channels).max(axis=(1, 3)))
 
 
 def _label(wrong: Mask) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
@@ -172,7 +186,7 @@ def _describe(envelope: Envelope, outside: Levels, labels: NDArray[np.int32], nu
     return tuple(blobs)
 
 
-def _offset(envelope: Envelope, found: Levels, stored: list[Levels]) -> tuple[float, Mask]:
+def _offset(envelope: Envelope, found: Levels, stored: list[Levels], facts: Facts) -> tuple[float, Mask]:
     """The mean difference of smooth areas, tile by tile: the largest, and the tiles where it is too large.
 
     A right picture is between the right one truncated and the right one rounded, as its file keeps them; what the mean
@@ -180,7 +194,10 @@ def _offset(envelope: Envelope, found: Levels, stored: list[Levels]) -> tuple[fl
     """
     height, width, _ = found.shape
     side = max(16, min(height, width) // 16)
-    smooth = (envelope.high - envelope.low).max(axis=-1) <= FLAT
+    edges = (envelope.high - envelope.low).max(axis=-1, keepdims=True) > FLAT
+    if facts.lossy:  # an edge disturbs its whole block
+        edges = _over_blocks(np.repeat(edges, 3, axis=-1), _block(facts))
+    smooth = ~edges.any(axis=-1)
     smooth &= (envelope.centre.max(axis=-1) < 254) & (envelope.centre.max(axis=-1) > 1)
     count = _sums(smooth[..., None].astype(np.float32), side)
     enough = count[..., 0] >= side * side // 3
@@ -189,7 +206,8 @@ def _offset(envelope: Envelope, found: Levels, stored: list[Levels]) -> tuple[fl
     means = [_sums((picture - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1) for picture in stored]
     mean = _sums((found - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1)
     means = means[:3]
-    over = np.maximum(np.min(means, axis=0) - MEAN - mean, mean - np.max(means, axis=0) - MEAN)
+    most = MEAN + (LOSSY if facts.lossy else 0)
+    over = np.maximum(np.min(means, axis=0) - most - mean, mean - np.max(means, axis=0) - most)
     over = np.where(enough[..., None], over, -1).max(axis=-1)
     tiles = over > 0
     area = np.repeat(np.repeat(tiles, side, axis=0), side, axis=1)[:height, :width] & smooth
