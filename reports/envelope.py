@@ -1,7 +1,7 @@
 """What a pixel may show: the least and the most that any sampling of it sees.
 
 A picture made elsewhere may sample its pixels at the centre, at random or many times over. Whatever it does, it sees
-what lies in the pixel: the range of the reference over 4 x 4 samples from edge to edge of the pixel, and its centre.
+what lies in the pixel: the range of the reference over 4 x 4 samples from corner to corner of the pixel, and its centre.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from reference.scene import Scene, Triple
 from reference.tracer import prepare, render
 from reference.world import View
 
-SAMPLES = 4  # across a pixel, the first and the last on its edges: what a line cuts off a pixel holds one of its corners
-LARGEST_SINGLE = 1e9  # coordinates beyond are left to double precision
+SAMPLES = 4  # across a pixel
+REACH = 0.499  # pixels from the centre to the outermost: whatever line crosses the pixel, there is one on either side
 UNLIT = replace(DOCUMENT, name="unlit", summary="surfaces shine in their own colour", ambient=lambda colour, *_: colour)
 
 Levels = NDArray[np.float32]
@@ -35,6 +35,7 @@ class Envelope:
     scene: Scene
     depth: int
     centre: Levels
+    mean: Levels  # of the pixel's area
     low: Levels
     high: Levels
     objects: NDArray[np.uint16]
@@ -57,22 +58,24 @@ def envelope(scene: Scene, width: int, height: int, depth: int = 3) -> Envelope:
     Raises InputError and DeviceError as `reference.tracer.render` does.
     """
     centre = np.clip(render(scene, width=width, height=height, depth=depth), 0, 255)
-    view, numbers = View(width, height, depth), [abs(n) for s in scene.spheres for n in (*s.centre, s.radius)]
-    numbers += [abs(n) for plane in scene.planes for n in plane.point]
-    world = prepare(scene, precision="single" if max(numbers, default=0) < LARGEST_SINGLE else "double")
+    view, world = View(width, height, depth), prepare(scene, precision="double")
     low = high = world.Vector(*(world.Float(np.ascontiguousarray(centre[..., c].ravel())) for c in range(3)))
     pixel = dr.arange(world.Index, width * height)
     across = dr.opaque(world.Index, width)
     column, row = world.Float(pixel % across), world.Float(pixel // across)
-    steps = np.arange(SAMPLES) / (SAMPLES - 1) - 0.5
-    for y in steps:
-        for x in steps:
+    mean, steps = world.Vector(0), np.linspace(-REACH, REACH, SAMPLES)
+    weights = np.ones(SAMPLES) / (SAMPLES - 1)
+    weights[[0, -1]] /= 2  # as of the trapezoids between samples
+    for y, down in zip(steps, weights, strict=True):
+        for x, right in zip(steps, weights, strict=True):
             shift = dr.opaque(world.Float, x), dr.opaque(world.Float, y)
             colour = world.colours(view, dr.opaque(world.Index, 0), column + shift[0], row + shift[1])
+            colour = dr.clip(colour, 0, 255)
             low, high = dr.minimum(low, colour), dr.maximum(high, colour)
-            dr.eval(low, high)
-    bounds = [np.clip(side.numpy().T.reshape(height, width, 3), 0, 255).astype(np.float32) for side in (low, high)]
-    return Envelope(scene, depth, centre, bounds[0], bounds[1], *identify(scene, view))
+            mean = dr.fma(colour, dr.opaque(world.Float, down * right), mean)
+            dr.eval(low, high, mean)
+    pictures = [side.numpy().T.reshape(height, width, 3).astype(np.float32) for side in (mean, low, high)]
+    return Envelope(scene, depth, centre, *pictures, *identify(scene, view))
 
 
 def identify(scene: Scene, view: View) -> tuple[NDArray[np.uint16], tuple[str, ...]]:

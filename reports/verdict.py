@@ -26,10 +26,10 @@ BLOB = 4  # pixels that may be so, connected
 ROUNDING = 1.0  # levels by which any 8-bit picture may differ
 SPECKS = 5e-4  # of all pixels that may be outside one by one
 MEAN = 0.6  # levels by which the mean of an area may differ beyond truncating and rounding
-LOSSY = 0.5  # levels more where the format is not exact
 AREA = 5e-3  # of all pixels, which such an area must have
 FLAT = 2.0  # levels: a pixel whose samples differ by no more is no edge
-SAME = 0.4  # of the blocks with edges that tell that pixels are sampled at their centres
+SAME_PIXELS, SAME_BLOCKS = 0.85, 0.5  # of those that tell whether pixels are sampled at their centres
+TELLING = 8  # pixels or blocks that must tell it
 CONNECTED = np.ones((3, 3), bool)
 LISTED = 50  # blobs at most
 
@@ -77,7 +77,7 @@ def judge(envelope: Envelope, submission: Submission) -> Verdict:
         raise InputError(f"expected a picture of {sizes[0]} pixels, found {sizes[1]}")
     right = quantise(envelope.centre)
     stored = [store(guess, facts) for guess in _guesses(envelope)]
-    exact = _is_exact(envelope, found, stored[:2], _block(facts))
+    exact = _is_exact(found, stored, facts)
     low, high = _bounds(envelope, facts, stored, exact)
     outside = np.maximum(np.maximum(low - found, found - high), 0)
     wrong = outside.max(axis=-1) > OUTSIDE
@@ -115,32 +115,41 @@ def store(levels: Levels, facts: Facts) -> Levels:
 
 
 def _guesses(envelope: Envelope) -> list[Levels]:
-    """Pictures in 8 bit that are right: truncated, rounded, antialiased; and a level too dark, a level too bright."""
-    centre, middle = envelope.centre, (envelope.low + envelope.high) / 2
-    pictures = [centre, np.rint(centre), np.rint(middle), centre - 1, centre + 1]
+    """Pictures in 8 bit that are right: truncated, rounded, antialiased and sampled at random places.
+
+    And two that are nearly so: a level too dark, and a level too bright.
+    """
+    centre, part = envelope.centre, np.random.default_rng(0).random(envelope.centre.shape[:2], np.float32)[..., None]
+    random = envelope.low + (envelope.high - envelope.low) * part
+    pictures = [centre, np.rint(centre), np.rint(envelope.mean), random, centre - 1, centre + 1]
     return [quantise(picture).astype(np.float32) for picture in pictures]
 
 
-def _is_exact(envelope: Envelope, found: Levels, stored: list[Levels], side: int) -> bool:
-    """Whether the blocks that hold edges are, for a good part, those of samples at the centres."""
-    edges = _blocks((envelope.high - envelope.low).max(axis=-1), side) > 2 * OUTSIDE
-    off = [_blocks(np.abs(found - picture).max(axis=-1), side) for picture in stored]
+def _is_exact(found: Levels, stored: list[Levels], facts: Facts) -> bool:
+    """Whether pixels are sampled at their centres.
+
+    Where an antialiased picture would be different most of it is as it is for samples at the centres; block by block
+    for a JPEG.
+    """
+    side, least = (_block(facts), SAME_BLOCKS) if facts.tables else (1, SAME_PIXELS)
+    telling = _blocks(np.abs(stored[2] - stored[1]).max(axis=-1), side) > 2 * OUTSIDE
+    off = [_blocks(np.abs(found - picture).max(axis=-1), side) for picture in stored[:2]]
     same = np.min(off, axis=0) <= 2 * ROUNDING
-    return bool(same[edges].mean() >= SAME) if edges.any() else bool(same.mean() >= SAME)
+    return bool(telling.sum() >= TELLING and same[telling].mean() >= least)
 
 
 def _bounds(envelope: Envelope, facts: Facts, stored: list[Levels], exact: bool) -> tuple[Levels, Levels]:
     """The least and the most of each channel that the file may hold."""
     if exact:
         slack = ROUNDING + (2 if facts.lossy else 0)
-        centres = [stored[0], stored[1], *stored[3:]] if facts.lossy else stored[:1]
+        centres = [stored[0], stored[1], *stored[4:]] if facts.lossy else stored[:1]
         return np.min(centres, axis=0) - slack, np.max(centres, axis=0) + slack
     low, high = envelope.low - ROUNDING, envelope.high + ROUNDING
     if not facts.tables:
         slack = 24.0 if facts.lossy else 0.0
         return low - slack, high + slack
     guesses = _guesses(envelope)
-    error = np.max([np.abs(after - before) for after, before in zip(stored, guesses, strict=True)], axis=0)
+    error = np.max([np.abs(after - before) for after, before in zip(stored[:4], guesses, strict=False)], axis=0)
     slack = 1.25 * _over_blocks(error, _block(facts)) + 2
     return low - slack, high + slack
 
@@ -203,10 +212,10 @@ def _offset(envelope: Envelope, found: Levels, stored: list[Levels], facts: Fact
     enough = count[..., 0] >= side * side // 3
     if not enough.any():
         return 0.0, np.zeros((height, width), bool)
-    means = [_sums((picture - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1) for picture in stored]
+    means = [_sums((picture - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1) for picture in stored[:4]]
     mean = _sums((found - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1)
-    means = means[:3]
-    most = MEAN + (LOSSY if facts.lossy else 0)
+    steps = [table[0] for table in facts.tables[:1] + facts.tables[-1:]]  # of a block's mean, times 8
+    most = MEAN + (sum(steps) / 16 if steps else 0.5 * facts.lossy)
     over = np.maximum(np.min(means, axis=0) - most - mean, mean - np.max(means, axis=0) - most)
     over = np.where(enough[..., None], over, -1).max(axis=-1)
     tiles = over > 0
