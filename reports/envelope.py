@@ -1,12 +1,13 @@
 """What a pixel may show: the least and the most that any sampling of it sees.
 
 A picture made elsewhere may sample its pixels at the centre, at random or many times over. Whatever it does, it sees
-what lies in the pixel: the range of the reference over 4 x 4 samples from corner to corner of the pixel, and its centre.
+what lies in the pixel: the range of the reference over 4 x 4 samples, the corners and the centre of the pixel.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import drjit as dr
@@ -19,7 +20,7 @@ from reference.tracer import prepare, render
 from reference.world import View
 
 SAMPLES = 4  # across a pixel
-REACH = 0.499  # pixels from the centre to the outermost: whatever line crosses the pixel, there is one on either side
+CORNER = 0.499  # pixels from the centre: whatever line crosses the pixel, there is a corner on either side
 UNLIT = replace(DOCUMENT, name="unlit", summary="surfaces shine in their own colour", ambient=lambda colour, *_: colour)
 
 Levels = NDArray[np.float32]
@@ -35,7 +36,7 @@ class Envelope:
     scene: Scene
     depth: int
     centre: Levels
-    mean: Levels  # of the pixel's area
+    mean: Levels  # of the 4 x 4 samples
     low: Levels
     high: Levels
     objects: NDArray[np.uint16]
@@ -53,7 +54,7 @@ class Envelope:
 
 
 def envelope(scene: Scene, width: int, height: int, depth: int = 3) -> Envelope:
-    """The bounds for a size in pixels and a depth limit: 18 pictures of the reference.
+    """The bounds for a size in pixels and a depth limit: 22 pictures of the reference.
 
     Raises InputError and DeviceError as `reference.tracer.render` does.
     """
@@ -63,16 +64,14 @@ def envelope(scene: Scene, width: int, height: int, depth: int = 3) -> Envelope:
     pixel = dr.arange(world.Index, width * height)
     across = dr.opaque(world.Index, width)
     column, row = world.Float(pixel % across), world.Float(pixel // across)
-    mean, steps = world.Vector(0), np.linspace(-REACH, REACH, SAMPLES)
-    weights = np.ones(SAMPLES) / (SAMPLES - 1)
-    weights[[0, -1]] /= 2  # as of the trapezoids between samples
-    for y, down in zip(steps, weights, strict=True):
-        for x, right in zip(steps, weights, strict=True):
-            shift = dr.opaque(world.Float, x), dr.opaque(world.Float, y)
+    mean, inside = world.Vector(0), (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
+    for weight, steps in ((1 / SAMPLES**2, inside), (0, (-CORNER, CORNER))):
+        for down, right in product(steps, steps):
+            shift = dr.opaque(world.Float, right), dr.opaque(world.Float, down)
             colour = world.colours(view, dr.opaque(world.Index, 0), column + shift[0], row + shift[1])
             colour = dr.clip(colour, 0, 255)
             low, high = dr.minimum(low, colour), dr.maximum(high, colour)
-            mean = dr.fma(colour, dr.opaque(world.Float, down * right), mean)
+            mean = dr.fma(colour, dr.opaque(world.Float, weight), mean)
             dr.eval(low, high, mean)
     pictures = [side.numpy().T.reshape(height, width, 3).astype(np.float32) for side in (mean, low, high)]
     return Envelope(scene, depth, centre, *pictures, *identify(scene, view))

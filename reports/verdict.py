@@ -87,7 +87,7 @@ def judge(envelope: Envelope, submission: Submission) -> Verdict:
     moved = displacement(envelope, found)
     reasons = {
         "blobs": large.size > 0,
-        "specks": int(wrong.sum()) > max(16, SPECKS * wrong.size),
+        "specks": int(wrong.sum()) > max(16, SPECKS * wrong.size) * (4 if facts.lossy else 1),
         "offset": bool(area.any()),
         "displaced": moved.significant and not exact,
     }
@@ -215,7 +215,7 @@ def _offset(envelope: Envelope, found: Levels, stored: list[Levels], facts: Fact
     means = [_sums((picture - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1) for picture in stored[:4]]
     mean = _sums((found - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1)
     steps = [table[0] for table in facts.tables[:1] + facts.tables[-1:]]  # of a block's mean, times 8
-    most = MEAN + (sum(steps) / 16 if steps else 0.5 * facts.lossy)
+    most = MEAN + sum(steps) / 16 + (0.5 if facts.lossy else 0)
     over = np.maximum(np.min(means, axis=0) - most - mean, mean - np.max(means, axis=0) - most)
     over = np.where(enough[..., None], over, -1).max(axis=-1)
     tiles = over > 0
