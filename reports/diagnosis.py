@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import combinations
 from typing import Any
 
@@ -31,11 +31,11 @@ COARSE = 250  # blocks a side that pictures are compared in, or so
 QUIET = 1.0  # levels that a block may be off without a reason
 MOST = 48.0  # levels: a block that is farther off counts no more
 NAMED = 0.7  # the least share of a cause that is named, not guessed
-SURE = 0.93  # the share from which on nothing else is looked for
 GUESS = 0.25  # the least share of a cause that is listed
-PAIR_COST, FIT_COST = 0.04, 0.02  # what a second mistake, or a number, must explain more
+LEFT = 0.004  # of the difference: what is left unexplained that tells nothing
+PAIR_COST, FIT_COST = 1.7, 1.3  # how many times as much a second mistake, or a number, must explain of what is left
 LISTED = 5
-PAIRED = 6  # pairs that are drawn
+PAIRED = 8  # pairs that are drawn
 SPECKS = 0.9  # of the pixels that are off must be just as the mistake has them, where it comes and goes
 
 
@@ -60,10 +60,10 @@ class Hypothesis:
     def __init__(self, ids: tuple[str, ...], mistakes: tuple[Mistake, ...], blocks: Levels, value: float | None = None):
         self.ids, self.mistakes, self.blocks, self.value = ids, mistakes, blocks, value
 
-    @property
-    def cost(self) -> float:
-        """What it must explain more than a simpler one."""
-        return PAIR_COST * (len(self.ids) - 1) + FIT_COST * (self.value is not None)
+    def rank(self, share: float) -> float:
+        """What is left unexplained, dearer for a second mistake or a number that was fitted: the less the better."""
+        cost: float = PAIR_COST ** (len(self.ids) - 1) * FIT_COST ** (self.value is not None)
+        return max(1 - share, LEFT) * cost
 
 
 class Suspects:
@@ -74,16 +74,17 @@ class Suspects:
         shrink = -(-max(view.width, view.height) // LARGEST)
         self.view = replace(view, width=-(-view.width // shrink), height=-(-view.height // shrink))
         self.block = max(1, min(self.view.width, self.view.height) // COARSE)
+        self.small = replace(self.view, width=self.view.width // self.block, height=self.view.height // self.block)
 
-    def draw(self, mistake: Mistake) -> Levels | None:
-        """The picture that a mistake makes, as bytes have it, in blocks; None where it makes none."""
+    def draw(self, mistake: Mistake, *, roughly: bool = False) -> Levels | None:
+        """The picture that a mistake makes, as bytes have it, in blocks, or `roughly` one ray a block; None for none."""
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             try:
-                levels = mistake.draw(self.scene, self.view)
+                levels = mistake.draw(self.scene, self.small if roughly else self.view)
             except CrossrayError:
                 return None
-        return blocks(as_bytes(levels), self.block)
+        return blocks(as_bytes(levels), 1 if roughly else self.block)
 
     def blocks_of(self, levels: NDArray[Any]) -> Levels:
         """Somebody's picture, of any size, in the same blocks."""
@@ -161,9 +162,9 @@ def diagnose(suspects: Suspects, levels: NDArray[Any]) -> list[Cause]:
     found = [(share(single), single) for single in suspects.singles]
     found += [(part, speck) for part, speck in _speckles(suspects, picture, levels, base)]
     for further in (_fitted, _pairs):
-        if max((part for part, _ in found), default=0.0) < SURE:
+        if max((part for part, _ in found), default=0.0) < 1 - 2 * LEFT:
             found += [(share(one), one) for one in further(suspects, picture, found)]
-    found.sort(key=lambda pair: pair[1].cost - pair[0])
+    found.sort(key=lambda pair: pair[1].rank(pair[0]))
     causes: list[Cause] = []
     for part, hypothesis in found:
         cause = _cause(part, hypothesis)
@@ -220,15 +221,10 @@ def _fitted(suspects: Suspects, picture: Levels, found: Any) -> Iterator[Hypothe
 
 
 def _best_value(suspects: Suspects, picture: Levels, id_: str, family: Family) -> Iterator[Hypothesis]:
-    drawn: dict[float, tuple[float, Levels, Mistake]] = {}
-
+    @cache
     def error(value: float) -> float:
-        if value not in drawn:
-            mistake = family.mistake(value, suspects.scene)
-            made = suspects.draw(mistake)
-            made = suspects.right if made is None else made
-            drawn[value] = distance(picture, made), made, mistake
-        return drawn[value][0]
+        made = suspects.draw(family.of(value), roughly=True)
+        return np.inf if made is None else distance(picture, made)
 
     low, high = family.bounds
     grid = np.geomspace(low, high, 7) if low > 0 else np.linspace(low, high, 7)
@@ -238,8 +234,9 @@ def _best_value(suspects: Suspects, picture: Levels, id_: str, family: Family) -
         step = step**0.5 if low > 0 else step / 2
         sides = (best / step, best * step) if low > 0 else (best - step, best + step)
         best = min((best, *(float(np.clip(value, low, high)) for value in sides)), key=error)
-    _, made, mistake = drawn[best]
-    yield Hypothesis((id_,), (mistake,), made, best)
+    mistake = family.mistake(best, suspects.scene)
+    if (made := suspects.draw(mistake)) is not None:
+        yield Hypothesis((id_,), (mistake,), made, best)
 
 
 def _background(suspects: Suspects, picture: Levels) -> Iterator[Hypothesis]:
@@ -258,15 +255,10 @@ def _background(suspects: Suspects, picture: Levels) -> Iterator[Hypothesis]:
 
 def _light(suspects: Suspects, picture: Levels) -> Hypothesis:
     """The place of the light that explains most: from usual ones, along each axis with ever smaller steps."""
-    drawn: dict[tuple[float, ...], tuple[float, Levels, Mistake]] = {}
-
+    @cache
     def error(place: tuple[float, float, float]) -> float:
-        if place not in drawn:
-            mistake = light_at(place)
-            made = suspects.draw(mistake)
-            made = suspects.right if made is None else made
-            drawn[place] = distance(picture, made), made, mistake
-        return drawn[place][0]
+        made = suspects.draw(light_at(place), roughly=True)
+        return np.inf if made is None else distance(picture, made)
 
     x, y, z = LIGHT
     starts = [(-x, y, z), (x, -y, z), (x, y, -z), (-x, y, -z), (x, y, 0.0), (0.0, y, 0.0), (0.0, y, z), (0.0, 0.0, 0.0)]
@@ -277,8 +269,8 @@ def _light(suspects: Suspects, picture: Levels) -> Hypothesis:
         better: Any = min([best, *sides], key=error)
         step = step / 2 if better == best else step
         best = better
-    _, made, mistake = drawn[best]
-    return Hypothesis(("LP",), (mistake,), made, 0.0)
+    made = suspects.draw(light_at(best))
+    return Hypothesis(("LP",), (light_at(best),), suspects.right if made is None else made, 0.0)
 
 
 def _pairs(suspects: Suspects, picture: Levels, found: list[tuple[float, Hypothesis]]) -> Iterator[Hypothesis]:
