@@ -28,14 +28,17 @@ Levels = NDArray[np.float32]
 
 LARGEST = 1000  # pixels a side that mistakes are drawn at, at most
 COARSE = 250  # blocks a side that pictures are compared in, or so
+ROUGH = 2  # blocks beside each other, where that will do
 QUIET = 1.0  # levels that a block may be off without a reason
 MOST = 48.0  # levels: a block that is farther off counts no more
 NAMED = 0.7  # the least share of a cause that is named, not guessed
 GUESS = 0.25  # the least share of a cause that is listed
 LEFT = 0.004  # of the difference: what is left unexplained that tells nothing
 PAIR_COST, FIT_COST = 1.7, 1.3  # how many times as much a second mistake, or a number, must explain of what is left
+PLAIN, FEW = 5.0, 0.002  # levels that a block is off beyond doubt, and the share of blocks that may be
 LISTED = 5
 PAIRED = 8  # pairs that are drawn
+PROMISING = 0.97  # of the difference may be left by a family's best number for it to be looked into
 SPECKS = 0.9  # of the pixels that are off must be just as the mistake has them, where it comes and goes
 
 
@@ -74,7 +77,8 @@ class Suspects:
         shrink = -(-max(view.width, view.height) // LARGEST)
         self.view = replace(view, width=-(-view.width // shrink), height=-(-view.height // shrink))
         self.block = max(1, min(self.view.width, self.view.height) // COARSE)
-        self.small = replace(self.view, width=self.view.width // self.block, height=self.view.height // self.block)
+        self.rough = self.block * ROUGH
+        self.small = replace(self.view, width=self.view.width // self.rough, height=self.view.height // self.rough)
 
     def draw(self, mistake: Mistake, *, roughly: bool = False) -> Levels | None:
         """The picture that a mistake makes, as bytes have it, in blocks, or `roughly` one ray a block; None for none."""
@@ -89,6 +93,10 @@ class Suspects:
     def blocks_of(self, levels: NDArray[Any]) -> Levels:
         """Somebody's picture, of any size, in the same blocks."""
         return blocks(resized(levels, self.view), self.block)
+
+    def roughly(self, picture: Levels) -> Levels:
+        """Blocks as `draw` has them roughly."""
+        return blocks(picture, ROUGH)[: self.small.height, : self.small.width]
 
     @cached_property
     def right(self) -> Levels:
@@ -113,7 +121,8 @@ class Suspects:
 
 def as_bytes(levels: NDArray[Any]) -> Levels:
     """Clamped and truncated, as in a file."""
-    return np.floor(np.clip(np.nan_to_num(levels, nan=0, posinf=255, neginf=0), 0, 255)).astype(np.float32)
+    whole = np.floor(np.fmin(np.fmax(np.asarray(levels, np.float32), 0), 255))  # what is not a number becomes 0
+    return np.asarray(whole, np.float32)
 
 
 def resized(levels: NDArray[Any], view: View) -> Levels:
@@ -134,8 +143,8 @@ def blocks(levels: NDArray[Any], size: int) -> Levels:
     height, width = (side // size * size for side in levels.shape[:2])
     if size == 1:
         return np.asarray(levels, np.float32)
-    parts = levels[:height, :width].reshape(height // size, size, width // size, size, -1)
-    return np.asarray(parts.mean(axis=(1, 3)), np.float32)
+    columns = sum(levels[:height, first:width:size] for first in range(size))
+    return np.asarray(sum(columns[first::size] for first in range(size)) / size**2, np.float32)
 
 
 def distance(one: Levels, other: Levels) -> float:
@@ -145,7 +154,7 @@ def distance(one: Levels, other: Levels) -> float:
 
 def off(error: Levels) -> NDArray[np.float32]:
     """What counts of the error of each block."""
-    worst = error.max(axis=-1)
+    worst = np.maximum(np.maximum(error[..., 0], error[..., 1]), error[..., 2])
     return np.asarray(np.minimum(np.maximum(worst - QUIET, 0), MOST), np.float32)
 
 
@@ -162,7 +171,7 @@ def diagnose(suspects: Suspects, levels: NDArray[Any]) -> list[Cause]:
     found = [(share(single), single) for single in suspects.singles]
     found += [(part, speck) for part, speck in _speckles(suspects, picture, levels, base)]
     for further in (_fitted, _pairs):
-        if max((part for part, _ in found), default=0.0) < 1 - 2 * LEFT:
+        if not _is_settled(picture, max(found, key=lambda pair: pair[0], default=None)):
             found += [(share(one), one) for one in further(suspects, picture, found)]
     found.sort(key=lambda pair: pair[1].rank(pair[0]))
     causes: list[Cause] = []
@@ -171,6 +180,13 @@ def diagnose(suspects: Suspects, levels: NDArray[Any]) -> list[Cause]:
         if part >= GUESS and cause.id not in [known.id for known in causes]:
             causes.append(cause)
     return causes[:LISTED]
+
+
+def _is_settled(picture: Levels, best: tuple[float, Hypothesis] | None) -> bool:
+    """Whether what the best hypothesis leaves is no more than JPEG and antialiasing may do."""
+    if best is None or best[0] < NAMED:
+        return False
+    return best[0] > 1 - 2 * LEFT or float(np.mean(off(np.abs(picture - best[1].blocks)) > PLAIN)) < FEW
 
 
 def _cause(share: float, hypothesis: Hypothesis) -> Cause:
@@ -224,11 +240,15 @@ def _best_value(suspects: Suspects, picture: Levels, id_: str, family: Family) -
     @cache
     def error(value: float) -> float:
         made = suspects.draw(family.of(value), roughly=True)
-        return np.inf if made is None else distance(picture, made)
+        return np.inf if made is None else distance(rough, made)
+
+    rough = suspects.roughly(picture)
 
     low, high = family.bounds
     grid = np.geomspace(low, high, 7) if low > 0 else np.linspace(low, high, 7)
     best = min(map(float, grid), key=error)
+    if error(best) > PROMISING * distance(rough, suspects.roughly(suspects.right)):
+        return
     step = grid[1] / grid[0] if low > 0 else grid[1] - grid[0]
     for _ in range(9):  # the interval around the best is divided again and again
         step = step**0.5 if low > 0 else step / 2
@@ -255,17 +275,22 @@ def _background(suspects: Suspects, picture: Levels) -> Iterator[Hypothesis]:
 
 def _light(suspects: Suspects, picture: Levels) -> Hypothesis:
     """The place of the light that explains most: from usual ones, along each axis with ever smaller steps."""
+
     @cache
     def error(place: tuple[float, float, float]) -> float:
         made = suspects.draw(light_at(place), roughly=True)
-        return np.inf if made is None else distance(picture, made)
+        return np.inf if made is None else distance(rough, made)
+
+    rough = suspects.roughly(picture)
 
     x, y, z = LIGHT
     starts = [(-x, y, z), (x, -y, z), (x, y, -z), (-x, y, -z), (x, y, 0.0), (0.0, y, 0.0), (0.0, y, z), (0.0, 0.0, 0.0)]
     best = min(starts, key=error)
     step = 250.0
     while step >= 4:
-        sides = [tuple(c + step * sign * (i == axis) for i, c in enumerate(best)) for axis in range(3) for sign in (1, -1)]
+        sides = [
+            tuple(c + step * sign * (i == axis) for i, c in enumerate(best)) for axis in range(3) for sign in (1, -1)
+        ]
         better: Any = min([best, *sides], key=error)
         step = step / 2 if better == best else step
         best = better
