@@ -11,7 +11,9 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 from reference import Scene
-from reference.mistakes import MISTAKES, View
+from reference.image import quantise
+from reference.mistakes import MISTAKES
+from reference.world import View
 
 ROOT = Path(__file__).parent.parent
 SCENE, MISTAKE = ROOT / "scenes" / "example1.txt", "S8"
@@ -24,7 +26,7 @@ def photograph_grade() -> None:
 
     mistake = MISTAKES[MISTAKE]
     with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
-        pixels = mistake.finish(mistake.draw(Scene.load(SCENE), View(SIDE, SIDE, 3)))
+        pixels = quantise(mistake.draw(Scene.load(SCENE), View(SIDE, SIDE, 3)))
         Image.fromarray(pixels).save(Path(name) / "scene.jpg", quality=90)
         command = [sys.executable, "-m", "crossray", "grade", str(SCENE), "scene.jpg", "--quiet"]
         subprocess.run(command, cwd=name, check=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from reference.model import DOCUMENT, Window
 from reference.scene import Scene
 from reference.tracer import render
+from reference.world import View
 
 Mask = NDArray[np.bool_]
 
@@ -23,15 +24,6 @@ NEAR = 2  # pixels from an outline
 
 _NOTHING = Window(sphere=lambda t, leaving: t > dr.inf, plane=lambda t, facing, leaving: t > dr.inf)
 UNSHADOWED = replace(DOCUMENT, name="unshadowed", summary="nothing blocks the light", shadow=_NOTHING)
-
-
-@dataclass(frozen=True)
-class View:
-    """A picture's size in pixels and its depth limit."""
-
-    width: int
-    height: int
-    depth: int
 
 
 def locate(scene: Scene, view: View, excess: NDArray[np.floating[Any]]) -> tuple[str, ...]:

@@ -21,7 +21,8 @@ from PIL import Image
 import crossray as command_line
 from reference import DOCUMENT, Scene, render
 from reference.image import quantise, write_image
-from reference.mistakes import MISTAKES, View
+from reference.mistakes import MISTAKES
+from reference.world import View
 from reports import gradebook
 from reports.collection import Collection, Entry
 from reports.gradebook import Assignment
@@ -36,7 +37,7 @@ def drawn(path: Path, mistake: str = "") -> Image.Image:
     """The right picture of a scene, or one with a mistake of the bank."""
     scene, view = Scene.load(path), View(SIDE, SIDE, 3)
     if mistake:
-        return Image.fromarray(MISTAKES[mistake].finish(MISTAKES[mistake].draw(scene, view)))
+        return Image.fromarray(quantise(MISTAKES[mistake].draw(scene, view)))
     return Image.fromarray(quantise(np.asarray(render(scene, DOCUMENT, width=SIDE, height=SIDE))))
 
 
@@ -114,9 +115,7 @@ def test_what_is_no_picture_of_the_scene_has_no_false_cause(
     assert re.search(reason, picture["reason"] + picture["advice"])
 
 
-@pytest.mark.parametrize(
-    "name", ["cut_right.png", "cut_right.jpg", "text.png", "empty.png", "missing.png", "wide.png"]
-)
+@pytest.mark.parametrize("name", ["cut_right.png", "cut_right.jpg", "text.png", "empty.png", "missing.png", "wide.png"])
 def test_what_is_no_picture_is_unreadable(singles: tuple[int, dict[str, Any]], name: str) -> None:
     picture = singles[1][name]
     assert (picture["verdict"], picture["status"]) == ("unreadable", "refused")
@@ -138,7 +137,12 @@ def test_one_right_picture(tmp_path: Path) -> None:
     content = graded(tmp_path / "out")
     assert (content["version"], content["scene"]) == (1, "-")
     assert set(content["pictures"][0]) >= PICTURE
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"grade.html", "grade.json", "results.json", "pictures"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "grade.html",
+        "grade.json",
+        "results.json",
+        "pictures",
+    }
     assert json.loads((tmp_path / "out" / "results.json").read_text())["score"] == 100
 
 
@@ -277,7 +281,7 @@ def test_names_that_are_not_text(tmp_path: Path) -> None:
     folder.mkdir()
     right = drawn(EXAMPLE)
     for name in (b"\xff\xfe.png", b"..png", b"-rf.png", "Zoë <b>.png".encode(), b"a\n.png"):
-        with open(os.path.join(os.fsencode(folder), name), "wb") as file:
+        with (folder / os.fsdecode(name)).open("wb") as file:
             right.save(file, "PNG")
     words = ("grade", "--scene", EXAMPLE, folder, "--out", tmp_path / "out")
     result = crossray(*words)
