@@ -35,6 +35,7 @@ ROUNDED = "Right, with levels rounded that the document truncates: no pixel is o
 KEPT = 2  # scenes and sizes of which a worker keeps what is dear
 MOSTLY = 0.9  # of the wrong pixels are on the objects that are named
 STRANGE = 0.5  # of the picture wrong without a known mistake: it may be one of something else
+BLANK = 2.0  # levels that one colour may differ by in a JPEG
 SIDE = 100  # pixels at which other scenes are tried
 
 
@@ -100,17 +101,18 @@ def _wrong(
     """What a wrong picture's record says beyond any."""
     outside = int((excess > 0).any(axis=-1).sum())
     where = _where(bounds, excess)
-    causes = [_cause(cause, where) for cause in diagnose(_suspects(task.scene, view), submission.levels)]
-    features = next((cause["features"] for cause in causes if cause["named"]), None)
-    other = None if features else _other_scene(task, submission.levels)
-    if features is None:
-        features = list(locate(task.scene, view, excess)) if other is None else []
+    advice = _what_else(task, submission.levels)
+    found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels)
+    causes = [_cause(cause, where) for cause in found]
+    features = next((cause["features"] for cause in causes if cause["named"]), [])
+    if not features and not advice:
+        features = list(locate(task.scene, view, excess))
     share = f"{outside / (view.width * view.height):.2%}".replace(".00%", "%").replace("%", " %")
     return {
         "verdict": "wrong",
         "reason": f"{outside} of {view.width * view.height} pixels ({share}) cannot be right, {where}.",
         "outside": outside,
-        "advice": _advice(submission, outside / (view.width * view.height), features, other),
+        "advice": advice or _advice(outside / (view.width * view.height), features),
         "features": features,
         "causes": causes,
         "blobs": [_blob(blob) for blob in verdict.blobs[:LISTED]],
@@ -151,18 +153,22 @@ def _cause(cause: Cause, where: str) -> dict[str, Any]:
     }
 
 
-def _advice(submission: Submission, share: float, features: list[str], other: str | None) -> str:
-    """What to do about a picture that shows none of the known mistakes."""
-    levels = submission.levels
-    if other:
-        return f"This looks like a picture of {other}: is it the right file?"
-    if np.ptp(levels.reshape(-1, 3), axis=0).max() <= 2:
+def _what_else(task: Task, levels: NDArray[Any]) -> str:
+    """What a picture is that nobody drew of the scene, and what to do; empty for one that somebody may have."""
+    if np.ptp(levels.reshape(-1, 3), axis=0).max() <= BLANK:
         return "The whole picture has one colour: did the program write what it has drawn?"
+    if other := _other_scene(task, levels):
+        return f"This is a picture of {other}: is it the right file?"
+    return ""
+
+
+def _advice(share: float, features: list[str]) -> str:
+    """What to do about a picture that shows none of the known mistakes."""
     if features:
-        return f"The difference lies in the {' and '.join(features)}. Follow the rays of the worst pixel below."
+        return f"The difference lies in the {' and '.join(features)}. Follow the rays of the worst pixel."
     if share > STRANGE:
         return "Most of it is unlike the scene: is it a picture of this scene at all, with the assignment's camera?"
-    return "Follow the rays of the worst pixel below and compare each number with your program's."
+    return "Follow the rays of the worst pixel and compare each number with your program's."
 
 
 def _other_scene(task: Task, levels: NDArray[Any]) -> str | None:
