@@ -103,7 +103,7 @@ def _wrong(
     where = _where(bounds, excess)
     advice = _what_else(task, submission.levels)
     found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels)
-    causes = [_cause(cause, where) for cause in found]
+    causes = [_cause(cause, where) for cause in _telling(found)]
     features = next((cause["features"] for cause in causes if cause["named"]), [])
     if not features and not advice:
         features = list(locate(task.scene, view, excess))
@@ -135,6 +135,14 @@ def _where(bounds: Envelope, excess: NDArray[Any]) -> str:
     if names == ["background"]:
         return "where nothing is seen"
     return "on " + " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def _telling(causes: list[Cause]) -> list[Cause]:
+    """Without those that are the first and something more, where the first is good enough by itself."""
+    if not causes or not causes[0].named:
+        return causes
+    first = set(causes[0].parts)
+    return [causes[0], *(cause for cause in causes[1:] if not first <= set(cause.parts))]
 
 
 def _cause(cause: Cause, where: str) -> dict[str, Any]:
