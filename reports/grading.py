@@ -20,7 +20,7 @@ from reference.world import View
 from reports.diagnosis import Cause, Suspects, diagnose
 from reports.envelope import Envelope, envelope
 from reports.gradebook import Task, empty_record
-from reports.gradeimages import SMALL, THUMB, Album, surroundings
+from reports.gradeimages import SMALL, THUMB, Album, surroundings, worst_channel
 from reports.location import locate
 from reports.rays import pixel_sentence, ray_rows
 from reports.raytree import ray_tree
@@ -86,11 +86,11 @@ def _format(facts: Facts) -> str:
 def _excess(verdict: Verdict, submission: Submission, bounds: Envelope) -> NDArray[np.float32]:
     """How far each channel is off, in levels, where that counts: H x W x 3, 0 elsewhere; never 0 everywhere."""
     error = np.abs(submission.levels - bounds.centre)
-    wrong = verdict.outside.max(axis=-1) > OUTSIDE
+    wrong = worst_channel(verdict.outside) > OUTSIDE
     if "offset" in verdict.reasons:
         wrong = wrong | verdict.offset_area
     if not wrong.any():
-        wrong = error.max(axis=-1) > OUTSIDE
+        wrong = worst_channel(error) > OUTSIDE
     excess = np.where(wrong[..., None], np.maximum(verdict.outside, error * verdict.offset_area[..., None]), 0)
     return excess if excess.any() else error
 
@@ -99,7 +99,7 @@ def _wrong(
     task: Task, view: View, submission: Submission, bounds: Envelope, verdict: Verdict, excess: NDArray[np.float32]
 ) -> dict[str, Any]:
     """What a wrong picture's record says beyond any."""
-    outside = int((excess > 0).any(axis=-1).sum())
+    outside = int((worst_channel(excess) > 0).sum())
     where = _where(bounds, excess)
     advice = _what_else(task, submission.levels)
     found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels)
@@ -123,7 +123,7 @@ def _wrong(
 
 def _where(bounds: Envelope, excess: NDArray[Any]) -> str:
     """The objects that nearly all wrong pixels are on."""
-    seen = Counter(bounds.objects[(excess > 0).any(axis=-1)].tolist())
+    seen = Counter(bounds.objects[(worst_channel(excess) > 0)].tolist())
     names, told = [], 0
     for number, count in seen.most_common():
         names.append(bounds.names[number])
@@ -163,7 +163,7 @@ def _cause(cause: Cause, where: str) -> dict[str, Any]:
 
 def _what_else(task: Task, levels: NDArray[Any]) -> str:
     """What a picture is that nobody drew of the scene, and what to do; empty for one that somebody may have."""
-    if np.ptp(levels.reshape(-1, 3), axis=0).max() <= BLANK:
+    if max(float(np.ptp(levels[..., channel])) for channel in range(3)) <= BLANK:
         return "The whole picture has one colour: did the program write what it has drawn?"
     if other := _other_scene(task, levels):
         return f"This is a picture of {other}: is it the right file?"
@@ -213,7 +213,7 @@ def _blob(blob: Blob) -> dict[str, Any]:
 
 def _worst(task: Task, view: View, submission: Submission, excess: NDArray[Any]) -> dict[str, Any]:
     """The pixel that is farthest off, what is right there, and how that comes about."""
-    row, column = divmod(int(np.argmax(excess.max(axis=-1))), view.width)
+    row, column = divmod(int(np.argmax(worst_channel(excess))), view.width)
     pixel: Mapping[str, int] = {"column": column, "row": row}
     explanation = explain(task.scene, DOCUMENT, **pixel, width=view.width, height=view.height, depth=view.depth)
     found = [round(float(level), 2) for level in submission.levels[row, column]]

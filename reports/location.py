@@ -14,6 +14,7 @@ from reference.model import DOCUMENT, Window
 from reference.scene import Scene
 from reference.tracer import render
 from reference.world import View
+from reports.gradeimages import worst_channel
 
 Mask = NDArray[np.bool_]
 
@@ -31,7 +32,7 @@ def locate(scene: Scene, view: View, excess: NDArray[np.floating[Any]]) -> tuple
 
     `excess` is how far each channel is off, in levels, H x W x 3, 0 where it is right.
     """
-    worst = np.asarray(excess).max(axis=-1)
+    worst = worst_channel(np.asarray(excess))
     wrong = worst > 0
     if not wrong.any():
         return ()
@@ -82,7 +83,7 @@ def _grown(mask: Mask, by: int) -> Mask:
 
 def _differ(one: NDArray[Any], other: NDArray[Any]) -> Mask:
     """Where they do by more than half a level, and next to that, as far as JPEG and antialiasing smear it."""
-    return _grown((np.abs(one - other) > 0.5).any(axis=-1), 1)
+    return _grown(worst_channel(np.abs(one - other)) > 0.5, 1)
 
 
 def _draw(scene: Scene, view: View, model: Any) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from fakes import are_gone
 from helpers import EXAMPLE, ROOT, crossray
-from matplotlib.cbook import get_sample_data
+from matplotlib import cbook
 from PIL import Image
 
 import crossray as command_line
@@ -23,7 +23,7 @@ from reference import DOCUMENT, Scene, render
 from reference.image import quantise, write_image
 from reference.mistakes import MISTAKES
 from reference.world import View
-from reports import gradebook
+from reports import gradebook, workers
 from reports.collection import Collection, Entry
 from reports.gradebook import Assignment
 from reports.workers import Failed
@@ -56,8 +56,8 @@ def singles(tmp_path_factory: pytest.TempPathFactory) -> tuple[int, dict[str, di
     drawn(EXAMPLE, "S8").save(folder / "unshadowed.png")
     drawn(EXAMPLE, "C1").save(folder / "flipped.png")
     drawn(OTHER).save(folder / "other.png")
-    with get_sample_data("grace_hopper.jpg") as file:
-        Image.open(file).convert("RGB").resize((SIDE, SIDE)).save(folder / "photograph.jpg")
+    photograph = Image.open(cbook._get_data_path("sample_data", "grace_hopper.jpg"))
+    photograph.convert("RGB").resize((SIDE, SIDE)).save(folder / "photograph.jpg")
     Image.new("RGB", (SIDE, SIDE)).save(folder / "black.png")
     Image.new("RGB", (SIDE, SIDE), (255, 255, 255)).save(folder / "white.png")
     for name in ("right.png", "right.jpg"):
@@ -235,7 +235,7 @@ def test_bad_words(tmp_path: Path) -> None:
 def test_what_could_not_be_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("a.png", "b.png"):
         drawn(EXAMPLE).save(tmp_path / name)
-    real = gradebook.run_jobs
+    real = workers.run_jobs
 
     def sometimes(*jobs: Any, **options: Any) -> Any:
         for place, answer in real(*jobs, **options):
