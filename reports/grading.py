@@ -104,7 +104,7 @@ def _wrong(
     advice = _what_else(task, submission.levels)
     found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels)
     causes = [_cause(cause, where) for cause in _telling(found)]
-    features = next((cause["features"] for cause in causes if cause["named"]), [])
+    features: list[str] = next((cause["features"] for cause in causes if cause["named"]), [])
     if not features and not advice:
         features = list(locate(task.scene, view, excess))
     share = f"{outside / (view.width * view.height):.2%}".replace(".00%", "%").replace("%", " %")
