@@ -7,7 +7,9 @@ A ray walks to the nearer child whose box it meets and leaves the other for late
 bit for each level, which says whether the sibling there is still to be visited. Its lowest bit set, k levels up, leads
 to node (i >> k) ^ 1. (Barringer and Akenine-Moeller, Dynamic Stackless Binary Tree Traversal, JCGT 2(1), 2013.)
 
-Boxes are float32, rounded outward, and met with a margin: no sphere that a ray may meet is passed over.
+What takes longest is fetching nodes. So their boxes are on a grid across the scene, 10 bits a coordinate, where that
+does not make them much larger, and else float32. They are rounded outward and met with a margin: no sphere that a ray
+may meet is passed over.
 """
 
 from __future__ import annotations
@@ -25,8 +27,10 @@ from reference.tables import State, upload
 Number = Any  # a Dr.Jit array
 
 LEAF = 3  # spheres in a leaf, at most
-BOXES = 3  # packets of four numbers in a node: its children's boxes, each two corners
+BITS, STEPS = 10, 1 << 10  # of the grid
+COARSE = 2  # how many times larger the faces of leaves may be on the grid, on average
 SAMPLE = 64  # spheres that tell a node's longest side
+SMALLEST = 1e-30  # of a length
 FLATTEST = 1e-18  # component of a direction, so that its reciprocal and products with that stay finite
 ROUNDING = 2.0**-20  # of a coordinate, several times what the test of a box can lose
 
@@ -44,12 +48,20 @@ class Tree:
         self.order: NDArray[np.intp] = leaves[counts]
         self.ends = upload(types.Index, np.append(0, np.cumsum(counts.sum(axis=1))).astype(np.uint32))
         inside, reach = centres[leaves], radii[leaves, None]
-        low = (inside - reach).min(axis=1, initial=np.inf)
-        high = (inside + reach).max(axis=1, initial=-np.inf)
-        nodes = boxes(low, high)
-        self.nodes = upload(types.Float, nodes)
+        low, high = inside - reach, inside + reach
+        low, high = (low.min(axis=1), high.max(axis=1)) if len(centres) else (np.zeros((1, 3)), np.zeros((1, 3)))
+        first, last = low.min(axis=0), high.max(axis=0)
+        step = np.maximum(last - first, SMALLEST) / (STEPS - 2)
+        on_grid = np.floor((low - first) / step), np.ceil((high - first) / step)
+        larger = faces((on_grid[1] - on_grid[0]) * step) / np.maximum(faces(high - low), SMALLEST)
+        self.is_coarse = float(larger.mean()) < COARSE
+        words = upload(types.Index, packed(*on_grid) if self.is_coarse else single(low, high))
+        self.nodes = dr.reinterpret_array(types.Float, words)  # packets are of floats
+        dr.eval(self.nodes)
         self.leaves = dr.opaque(types.Index, len(leaves))
-        self.extent = dr.opaque(types.Float, float(np.abs(nodes).max(initial=0)))
+        start, step = (first, step) if self.is_coarse else (0 * first, 0 * step + 1)
+        self.start, self.step = ([dr.opaque(types.Float, value) for value in part.tolist()] for part in (start, step))
+        self.extent = dr.opaque(types.Float, float(np.abs([first, last]).max()) * (1 + ROUNDING))
 
     def fold(
         self,
@@ -67,20 +79,21 @@ class Tree:
         spheres may be off. Nothing beyond t = `reach(*state)` is sought, and nothing when not `going(*state)`.
         `place` is the sphere's in `order`. A sphere is visited once or never.
         """
-        number, index, packet = self.types.Float, self.types.Index, self.types.Vector4
+        number, index = self.types.Float, self.types.Index
         inverse = [dr.rcp(dr.select(dr.abs(d) < FLATTEST, dr.copysign(number(FLATTEST), d), d)) for d in direction]
         farthest = _larger(_larger(dr.abs(origin[0]), dr.abs(origin[1])), dr.abs(origin[2]))
         slack = margin + ROUNDING * (farthest + self.extent)
-        # (corner - (origin +- slack)) / d: the box grows by the slack on every side.
-        lows = [-(o + slack) * inv for o, inv in zip(origin, inverse, strict=True)]
-        highs = [-(o - slack) * inv for o, inv in zip(origin, inverse, strict=True)]
+        # (start + step * corner - (origin +- slack)) / d: the box grows by the slack on every side.
+        lows = [(s - o - slack) * inv for s, o, inv in zip(self.start, origin, inverse, strict=True)]
+        highs = [(s - o + slack) * inv for s, o, inv in zip(self.start, origin, inverse, strict=True)]
+        steps = [step * inv for step, inv in zip(self.step, inverse, strict=True)]
 
         def meet(low: list[Number], high: list[Number], end: Number) -> tuple[Number, Number]:
             """Where the ray enters a box, and whether it does before `end`."""
             enter, leave = number(0), end
             for axis in range(3):
-                one = dr.fma(low[axis], inverse[axis], lows[axis])
-                other = dr.fma(high[axis], inverse[axis], highs[axis])
+                one = dr.fma(low[axis], steps[axis], lows[axis])
+                other = dr.fma(high[axis], steps[axis], highs[axis])
                 enter, leave = _larger(enter, _smaller(one, other)), _smaller(leave, _larger(one, other))
             return enter, enter <= leave
 
@@ -92,8 +105,7 @@ class Tree:
 
         def descend(node: Number, pending: Number, end: Number) -> State:
             inner = node < self.leaves
-            packets = [dr.gather(packet, self.nodes, BOXES * node + part, inner) for part in range(BOXES)]
-            n = [value for part in packets for value in part]
+            n = self.corners(node, inner)
             left, meets_left = meet(n[0:3], n[3:6], end)
             right, meets_right = meet(n[6:9], n[9:12], end)
             both = meets_left & meets_right
@@ -127,6 +139,17 @@ class Tree:
         start = dr.select(going(*state), index(1), index(0))
         _, _, *found = dr.while_loop((start, index(0), *state), lambda node, *_: node != 0, advance)
         return tuple(found)
+
+    def corners(self, node: Number, active: Number) -> list[Number]:
+        """The boxes of a node's children: left low, left high, right low, right high, three numbers each."""
+        number, index, packet = self.types.Float, self.types.Index, self.types.Vector4
+        packets = 1 if self.is_coarse else 3
+        parts = (dr.gather(packet, self.nodes, packets * node + part, active) for part in range(packets))
+        found = [value for part in parts for value in part]
+        if not self.is_coarse:
+            return found
+        words = (dr.reinterpret_array(index, value) for value in found)
+        return [number(word >> BITS * axis & STEPS - 1) for word in words for axis in range(3)]
 
 
 def _smaller(a: Number, b: Number) -> Number:
@@ -165,14 +188,33 @@ def sort(centres: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.boo
     return sphere[slots].reshape(leaves, size), ~twice[slots].reshape(leaves, size)
 
 
-def boxes(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float32]:
-    """The boxes of all nodes' children, given each leaf's: a row of 12, left low, left high, right low, right high."""
-    leaves = len(low)
-    nodes = np.zeros((leaves, 2, 2, 3), np.float32)
+def faces(sides: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Half the area of the faces of each box, given their sides (n x 3)."""
+    area: NDArray[np.float64] = (sides * np.roll(sides, 1, axis=1)).sum(axis=1)
+    return area
+
+
+def packed(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """The boxes of all nodes' children, given each leaf's in steps of the grid: a row of 4 words."""
+    shifts = np.arange(3, dtype=np.uint32) * np.uint32(BITS)
+    corners = boxes(low.astype(np.uint32), high.astype(np.uint32))
+    words: NDArray[np.uint32] = np.bitwise_or.reduce(corners << shifts, axis=-1)
+    return words.reshape(len(low), 4)
+
+
+def single(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """The boxes of all nodes' children, given each leaf's: a row of 12 words, float32 in truth."""
     below = np.nextafter(low.astype(np.float32), np.float32(-np.inf))
     above = np.nextafter(high.astype(np.float32), np.float32(np.inf))
-    while (row := len(below) // 2) > 0:
-        below, above = below.reshape(row, 2, 3), above.reshape(row, 2, 3)
-        nodes[row : 2 * row, :, 0], nodes[row : 2 * row, :, 1] = below, above
-        below, above = below.min(axis=1), above.max(axis=1)
-    return nodes.reshape(leaves, 12)
+    return boxes(below, above).reshape(len(low), 12).view(np.uint32)
+
+
+def boxes(low: NDArray[Any], high: NDArray[Any]) -> NDArray[Any]:
+    """The boxes of all nodes' children, given each leaf's (leaves x 3): nodes x 2 children x 2 corners x 3."""
+    leaves = len(low)
+    nodes = np.zeros((leaves, 2, 2, 3), low.dtype)
+    while (row := len(low) // 2) > 0:
+        low, high = low.reshape(row, 2, 3), high.reshape(row, 2, 3)
+        nodes[row : 2 * row, :, 0], nodes[row : 2 * row, :, 1] = low, high
+        low, high = low.min(axis=1), high.max(axis=1)
+    return nodes

@@ -23,7 +23,9 @@ from reference.search import (
     ROUNDOFF,
     Search,
     Sight,
+    ambient_light,
     blocked,
+    brightness,
     distance,
     is_clear,
     nearest,
@@ -49,7 +51,7 @@ def is_draftable(scene: Scene, model: Model) -> bool:
     if model.reflected_origin is not DOCUMENT.reflected_origin and any(distance(p, EYE) > 0 for p in scene.planes):
         return False
     surfaces: list[Sphere | Plane] = [*scene.spheres, *scene.planes]
-    return max((_brightness(surface, _ambient(scene)) for surface in surfaces), default=0.0) < BRIGHTEST
+    return max((brightness(surface, ambient_light(scene)) for surface in surfaces), default=0.0) < BRIGHTEST
 
 
 class Draft:
@@ -58,48 +60,25 @@ class Draft:
     def __init__(self, world: World, single: Types) -> None:
         self.model, self.world, scene = world.model, world, world.scene
         self.search = Search(scene, single)
-        ambient = _ambient(scene)
         surfaces: tuple[Sphere | Plane, ...] = (*scene.spheres, *scene.planes)
-        self.shades = Rows(single, len(scene.spheres), [_shade_row(s, ambient) for s in surfaces], 8)
-        self.ambient = self.shades.Vector(*map(self.shades.uniform, ambient))
-        skew = any(isinstance(s, Plane) and s.unit_normal.count(0) < 2 for s in surfaces)
-        self.slack = self.shades.uniform((9 if skew else 1.25) * ROUNDOFF)
-        self.camera_slack = self.shades.uniform((9 if skew else 0.75) * ROUNDOFF)
-        self.bend = self.shades.uniform(12 * ROUNDOFF if skew else 0)
+        self.shades = Rows(single, len(scene.spheres), [_shade_row(s) for s in surfaces], 4)
+        self.ambient = self.shades.Vector(*map(self.shades.uniform, ambient_light(scene)))
         self.light = self.search.Vector(*LIGHT)
 
-    def draw(self, view: View, top: int, count: int) -> Number:
-        """Red, green and blue of each pixel in turn, in `count` rows from `top` on."""
-        kind = self.search.Index
-        pixel = dr.arange(kind, count * view.width)
-        colour, doubt = radiance(self, self.world.directions(view, top, pixel), dr.opaque(kind, view.depth))
-        picture = dr.ravel(colour + dr.zeros(self.search.Vector, len(pixel)))  # be they all the same
-        dr.eval(picture, doubt)
-        again = dr.compress(doubt)
-        if len(again):
-            right = self.search.Float(dr.ravel(self.world.colours(view, top, again)))
-            place = dr.arange(kind, 3 * len(again))
-            dr.scatter(picture, right, 3 * dr.gather(kind, again, place // 3) + place % 3)
-        return picture
+    def colours(self, view: View, top: Number, column: Number, row: Number) -> tuple[Vector, Mask]:
+        """The colours of some pixels, whose rows are counted from row `top` on, and which of them are in doubt."""
+        camera = self.world.directions(view, top, column, row)
+        found: tuple[Vector, Mask] = radiance(self, camera, dr.opaque(self.search.Index, view.depth))
+        return found
 
 
-def _shade_row(surface: Sphere | Plane, ambient: list[float]) -> State:
-    """Colour, diffuse and reflection coefficient, the most sent out at once.
+def _shade_row(surface: Sphere | Plane) -> State:
+    """Colour and diffuse coefficient.
 
     All planes have the light on the eye's side, as `is_clear` says: those whose normal points away are not lit.
     """
     away = isinstance(surface, Plane) and distance(surface, LIGHT) >= 0
-    return (*surface.colour, 0 if away else surface.diffuse, surface.reflection, _brightness(surface, ambient), 0, 0)
-
-
-def _ambient(scene: Scene) -> list[float]:
-    """Ambient light by channel, as a share of a surface's colour."""
-    return [value * scene.ambient_coefficient / 256 for value in scene.ambient]
-
-
-def _brightness(surface: Sphere | Plane, ambient: list[float]) -> float:
-    """The most that a surface may send out at once."""
-    return max(map(abs, surface.colour)) * (abs(surface.diffuse) + max(map(abs, ambient)))
+    return (*surface.colour, 0 if away else surface.diffuse)
 
 
 class Landing:
@@ -110,22 +89,30 @@ class Landing:
     times as far.
     """
 
-    def __init__(self, draft: Draft, hit: Number, met: tuple[Number, Vector, Vector, Number], d: Vector) -> None:
+    def __init__(
+        self,
+        draft: Draft,
+        hit: Number,
+        met: tuple[Number, Vector, Vector, Number],
+        d: Vector,
+        mirror: Number,
+        most: Number,
+    ) -> None:
+        self.mirror, self.brightness = mirror, most
         self.hit, (self.t, self.point, self.normal, self.curvature) = hit, met
         self.is_sphere = hit < draft.search.first_plane
         self.direction, self.slope = mirrored(d, self.normal), -dr.dot(d, self.normal)
         self.far = dr.abs(self.point.x) + dr.abs(self.point.y) + dr.abs(self.point.z)
         self.scale = self.far + draft.search.size
         self.spread = dr.select(self.is_sphere, 3.5, 1)
-        self.bend = dr.select(self.is_sphere, 12 * ROUNDOFF, draft.bend)
+        self.bend = dr.select(self.is_sphere, 12 * ROUNDOFF, draft.search.bend)
 
-    def bound(self, aside: Number, onto: Number, turn: Number, rival: Number) -> None:
+    def bound(self, aside: Number, onto: Number, turn: Number) -> None:
         """The errors of rays that pass up to `aside` beside their way and are turned by up to `turn`."""
         self.onto, self.shift = onto, dr.fma(aside, dr.rcp(self.slope), onto)
         self.off = dr.fma(2 * onto, self.slope, self.spread * aside)
         self.turn = dr.fma(2 * self.curvature, self.shift + onto, turn + self.bend)
-        clear = ((self.t + self.shift) * CERTAIN < rival) & (turn < STEADY)
-        clear &= dr.fma(8 * aside, self.curvature, GRAZED * GRAZED) < self.slope * self.slope
+        clear = (turn < STEADY) & (dr.fma(8 * aside, self.curvature, GRAZED * GRAZED) < self.slope * self.slope)
         self.doubt = ~clear
 
 
@@ -167,23 +154,23 @@ def _look(draft: Draft, camera: Vector) -> Landing:
     toward = search.Vector(camera)
     per_length = dr.rcp(dr.norm(toward))
     d = toward * per_length
-    hit, rival = seen(search, d, search.Mask(True))
+    hit, near, rival = seen(search, d)
     is_sphere = hit < search.first_plane
-    x, y, z, size, curvature, *_ = search.row(hit, hit != NOTHING)
+    x, y, z, size, curvature, mirror, most, _ = search.row(hit, hit != NOTHING)
     place = search.Vector(x, y, z)
-    along = dr.dot(place, d)
-    way = dr.fma(d, along, -place)
-    near = along - dr.sqrt(dr.fma(size, size, -dr.dot(way, way)))
-    t = dr.select(is_sphere, near, -size * dr.rcp(along))
+    along, t = dr.dot(place, d), dr.rcp(near)
     centre = dr.select(is_sphere, place, 0)
     q = dr.fma(toward, t * per_length, -centre)
     left = dr.select(is_sphere, 0.5 * dr.fma(size, size, -dr.dot(q, q)), -size - dr.dot(place, q))
     step = left * dr.rcp(dr.select(is_sphere, dr.dot(q, d), along))
     q = dr.fma(d, step, q)
-    landing = Landing(draft, hit, (t, q + centre, dr.select(is_sphere, q * curvature, place), curvature), d)
+    landing = Landing(
+        draft, hit, (t, q + centre, dr.select(is_sphere, q * curvature, place), curvature), d, mirror, most
+    )
     aside = dr.fma(step * step, curvature, search.coarse + dr.select(is_sphere, 4 * ROUNDOFF * size, 0))
-    aside = dr.fma(landing.far, draft.camera_slack, aside)
-    landing.bound(aside, landing.far * (2.5 * ROUNDOFF), search.Float(CAMERA_TURN), rival)
+    aside = dr.fma(landing.far, search.camera_slack, aside)
+    landing.bound(aside, landing.far * (2.5 * ROUNDOFF), search.Float(CAMERA_TURN))
+    landing.doubt |= ~((t + dr.abs(step) + landing.shift) * CERTAIN * rival < 1)
     return landing
 
 
@@ -197,14 +184,15 @@ def _follow(draft: Draft, ray: Sight, hit: Number, t: Number, rival: Number) -> 
     """Where mirrored rays meet surfaces."""
     search = draft.search
     is_sphere = hit < search.first_plane
-    x, y, z, size, curvature, *_ = search.row(hit, hit != NOTHING)
+    x, y, z, size, curvature, mirror, most, _ = search.row(hit, hit != NOTHING)
     point, place = dr.fma(ray.d, t, ray.origin), search.Vector(x, y, z)
     normal = dr.select(is_sphere, (point - place) * curvature, place)
-    landing = Landing(draft, hit, (t, point, normal, curvature), ray.d)
+    landing = Landing(draft, hit, (t, point, normal, curvature), ray.d, mirror, most)
     aside = dr.fma(1.25, dr.fma(ray.turn, t, ray.off), search.coarse + dr.select(is_sphere, 8 * ROUNDOFF * size, 0))
-    aside = dr.fma(t + landing.far, draft.slack, aside)
+    aside = dr.fma(t + landing.far, search.slack, aside)
     onto = dr.fma(16, t, dr.fma(1.2, landing.far, 9 * size)) * ROUNDOFF
-    landing.bound(aside, onto, ray.turn, rival)
+    landing.bound(aside, onto, ray.turn)
+    landing.doubt |= ~((t + landing.shift) * CERTAIN < rival)
     return landing
 
 
@@ -214,7 +202,7 @@ def _shade(draft: Draft, at: Landing, rounding: Number) -> tuple[Vector, Number,
     Ambient and diffuse light as in the model, with their common factor taken out.
     """
     search = draft.search
-    red, green, blue, diffuse, mirror, brightness, *_ = draft.shades.row(at.hit, at.hit != NOTHING)
+    red, green, blue, diffuse = draft.shades.row(at.hit, at.hit != NOTHING)
     to_light = draft.light - at.point
     length = dr.norm(to_light)
     nearness = dr.rcp(length)
@@ -226,5 +214,5 @@ def _shade(draft: Draft, at: Landing, rounding: Number) -> tuple[Vector, Number,
     light = dr.select(facing & ~dark, diffuse * cosine, 0)
     colour = search.Vector(red, green, blue) * (draft.ambient + light)
     moved = dr.fma(1.15 * dr.abs(cosine), at.shift, at.off + at.onto)
-    loss = brightness * dr.fma(moved, nearness, dr.fma(at.shift, at.curvature, rounding))
-    return colour, dr.select(at.doubt | ~(error < search.room) | (facing & open_), dr.inf, loss), mirror
+    loss = at.brightness * dr.fma(moved, nearness, dr.fma(at.shift, at.curvature, rounding))
+    return colour, dr.select(at.doubt | ~(error < search.room) | (facing & open_), dr.inf, loss), at.mirror

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import lru_cache
 from math import dist, hypot, inf, isclose
 from pathlib import Path
 
@@ -160,6 +161,7 @@ def _plane_identity(plane: Plane) -> tuple[Fraction, ...]:
     return (*direction, offset)
 
 
+@lru_cache(maxsize=1024)
 def exact(value: float) -> Fraction:
     """The decimal that was written for `value` (its shortest spelling), without rounding."""
     return Fraction(repr(value))

@@ -21,7 +21,7 @@ from numpy import float32
 
 from reference.device import Types
 from reference.model import SHIFT, Mask, Number, Vector
-from reference.scene import EYE, LIGHT, SCREEN_CORNERS, SCREEN_DISTANCE, Plane, Scene, Triple
+from reference.scene import EYE, LIGHT, SCREEN_CORNERS, SCREEN_DISTANCE, Plane, Scene, Sphere, Triple
 from reference.tables import NOTHING, Rows, State
 
 ROUNDOFF = 2.0**-24
@@ -34,6 +34,7 @@ WINDOW = 1.01 * SHIFT  # of the way to the light, up to which some convention do
 CLOSE = WINDOW / GRAZED  # a ray that has come so far is farther than SHIFT from the surface that it left
 FARTHEST = 1e12  # of what scenes extend to
 APART = 2.0**-9  # of the scene's size: how far the light must be from surfaces
+ASIDE = 2.0**-16  # of the scene's size: how far the eye must be from surfaces, several times what errors move them
 
 
 class Sight:
@@ -46,21 +47,38 @@ class Sight:
 class Search(Rows):
     """The surfaces of a scene in single precision.
 
-    A sphere's row: centre, radius, curvature, r^2 - c.c as camera rays need it. A plane's: unit normal toward the eye,
-    how far it is behind the eye, zero, and how far for camera rays.
+    A row: centre, radius and curvature of a sphere; unit normal of a plane toward the eye, how far it is behind the
+    eye, and zero. Then of both: reflection coefficient, the most that is sent out at once.
     """
 
     def __init__(self, scene: Scene, types: Types) -> None:
-        planes = [_toward_eye(plane) for plane in scene.planes]
+        planes = [toward_eye(plane) for plane in scene.planes]
         size = extent(scene)
         error = size * (CAMERA_TURN + ROUNDING)
-        rows: list[State] = [_sphere_row(s.centre, s.radius, error) for s in scene.spheres]
-        rows += [(*normal, height, 0, height - error, 0, 0) for *normal, height in planes]
+        surfaces: tuple[Sphere | Plane, ...] = (*scene.spheres, *scene.planes)
+        light = ambient_light(scene)
+        rows: list[State] = [(*s.centre, s.radius, 1 / s.radius) for s in scene.spheres]
+        rows += [(*plane, 0) for plane in planes]
+        rows = [(*row, s.reflection, brightness(s, light), 0) for row, s in zip(rows, surfaces, strict=True)]
         super().__init__(types, len(scene.spheres), rows, width=8)
+        self.ahead = Rows(
+            types,
+            len(scene.spheres),
+            [_sphere_seen(s.centre, s.radius, error) for s in scene.spheres]
+            + [
+                (*(value / (height - error) for value in normal), (CAMERA_TURN + PARALLEL) / (height - error))
+                for *normal, height in planes
+            ],
+            4,
+        )
         self.size = self.uniform(size)
         self.coarse = self.uniform(max(_coarseness(row) for row in [*rows, (0.0,)]))
         clear = [dist(s.centre, LIGHT) - s.radius for s in scene.spheres]
         self.room = self.uniform(min([*clear, *(abs(distance(p, LIGHT)) for p in scene.planes), size]) / 8)
+        skew = any(p.unit_normal.count(0) < 2 for p in scene.planes)
+        self.slack = self.uniform((9 if skew else 1.25) * ROUNDOFF)
+        self.camera_slack = self.uniform((9 if skew else 0.75) * ROUNDOFF)
+        self.bend = self.uniform(12 * ROUNDOFF if skew else 0)
         self.sharpest = self.uniform(max((1 / s.radius for s in scene.spheres), default=0))
 
 
@@ -76,12 +94,25 @@ def extent(scene: Scene) -> float:
     return 1 + max([*reach, hypot(*LIGHT)])
 
 
-def _sphere_row(centre: Triple, radius: float, error: float) -> State:
+def _sphere_seen(centre: Triple, radius: float, error: float) -> State:
+    """What camera rays need of a sphere: p = centre / k and k', for the root 1 / t = p.d + sqrt((p.d)^2 - 1 / k')."""
     square = sum(value * value for value in centre)
-    return (*centre, radius, 1 / radius, (radius + error) ** 2 - square * (1 - SQUARED), 0, 0)
+    beyond = square - (radius + error) ** 2
+    return (*(value / beyond for value in centre), SQUARED * square / beyond**2 - 1 / beyond)
 
 
-def _toward_eye(plane: Plane) -> State:
+def ambient_light(scene: Scene) -> list[float]:
+    """Ambient light by channel, as a share of a surface's colour."""
+    return [value * scene.ambient_coefficient / 256 for value in scene.ambient]
+
+
+def brightness(surface: Sphere | Plane, ambient: list[float]) -> float:
+    """The most that a surface may send out at once."""
+    return max(map(abs, surface.colour)) * (abs(surface.diffuse) + max(map(abs, ambient)))
+
+
+def toward_eye(plane: Plane) -> State:
+    """Unit normal toward the eye, and how far the plane is behind the eye."""
     height = -distance(plane, EYE)
     sign = copysign(1, height)
     return (*(sign * value for value in plane.unit_normal), sign * height)
@@ -98,8 +129,10 @@ def is_clear(scene: Scene) -> bool:
     And whether the light is apart from all surfaces, outside the spheres and on the eye's side of the planes, and no
     square overflows.
     """
-    room = APART * extent(scene)
-    if room > APART * FARTHEST:
+    size = extent(scene)
+    room = APART * size
+    near = [dist(s.centre, EYE) - s.radius for s in scene.spheres] + [abs(distance(p, EYE)) for p in scene.planes]
+    if size > FARTHEST or min(near, default=size) < ASIDE * size:
         return False
     spheres = all(
         s.centre[2] - s.radius > 1.001 * SCREEN_DISTANCE and dist(s.centre, LIGHT) - s.radius > room
@@ -123,21 +156,26 @@ def _closer(index: Number, t: Number, best: Number, rival: Number, hit: Number) 
     return dr.select(t < best, t, best), dr.select(later < rival, later, rival), dr.select(t < best, index, hit)
 
 
-def seen(search: Search, d: Vector, active: Mask) -> tuple[Number, Number]:
-    """Index of what each camera ray meets first, and a distance that nothing else comes before."""
+def seen(search: Search, d: Vector) -> tuple[Number, Number, Number]:
+    """Index of what each camera ray meets first, and two reciprocals: of a distance that this does not come before, and
+    of one that nothing else comes before.
+    """
+
+    def closer(index: Number, near: Number, best: Number, rival: Number, hit: Number) -> State:
+        later = dr.select(near > best, best, near)
+        rival = dr.select(later > rival, later, rival)
+        return dr.select(near > best, near, best), rival, dr.select(near > best, index, hit)
 
     def meet_sphere(index: Number, row: list[Number], *found: Number) -> State:
         ahead = dr.dot(search.Vector(*row[:3]), d)
-        t = ahead - dr.sqrt(dr.fma(ahead, ahead, row[5]))
-        return _closer(index, dr.select(ahead > 0, t, dr.inf), *found)
+        return closer(index, ahead + dr.sqrt(dr.fma(ahead, ahead, row[3])), *found)
 
     def meet_plane(index: Number, row: list[Number], *found: Number) -> State:
-        facing = (CAMERA_TURN + PARALLEL) - dr.dot(search.Vector(*row[:3]), d)
-        return _closer(index, dr.select(facing > 0, row[5] * dr.rcp(facing), dr.inf), *found)
+        return closer(index, row[3] - dr.dot(search.Vector(*row[:3]), d), *found)
 
-    nothing = search.Float(dr.inf), search.Float(dr.inf), search.Index(NOTHING)
-    _, rival, hit = search.through(meet_sphere, meet_plane, nothing, lambda *_: active)
-    return hit, rival
+    nothing = search.Float(0), search.Float(0), search.Index(NOTHING)
+    best, rival, hit = search.ahead.through(meet_sphere, meet_plane, nothing, lambda *_: True)
+    return hit, best, rival
 
 
 def nearest(search: Search, ray: Sight, active: Mask) -> tuple[Number, Number, Number, Mask]:

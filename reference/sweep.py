@@ -119,7 +119,8 @@ class _Ray:
 def _camera(world: BallWorld, width: int, height: int, top: int, count: int) -> tuple[Arrow, Ball]:
     """Directions to the centres of pixels, two coordinates rounded once, and the squares of their lengths."""
     pixel = dr.arange(world.Index, count * width)
-    column, row = pixel_places(world, width, top, pixel)
+    place, line = pixel_places(world, width, pixel)
+    column, row = world.Float(place), world.Float(line + dr.opaque(world.Index, top))
     across, down = world.uniform(width), world.uniform(height)
     x = (2 * column + 1 - across) * SCREEN / across
     y = (down - 1 - 2 * row) * SCREEN / down

@@ -27,7 +27,8 @@ UNROLLED = 16  # surfaces; beyond this, compile time outweighs what straight cod
 FEW_PLANES = 4  # that are straight code beside many spheres
 BAND = 1 << 22  # pixels a kernel launch, which bounds the memory of large pictures
 MATERIAL = 8  # numbers in a row of materials
-TILE = 4  # pixels a side
+TILE = 8  # pixels a side
+PIXELS = TILE * TILE  # of a tile
 FEW = 4096  # numbers that are quicker handed over one by one
 NOTHING = 0xFFFFFFFF  # the index of no surface
 
@@ -56,14 +57,17 @@ class Rows:
         self.tree = tree
         table = np.asarray(rows, np.float64 if self.Float is self.Double else np.float32).reshape(-1, width)
         self.numbers = upload(self.Float, table)
+        self.inputs = [self.numbers]  # all that kernels may read of it
         self.spheres, self.surfaces, self.width = spheres, len(table), width
         first = 0 if len(table) <= UNROLLED else spheres if len(table) - spheres <= FEW_PLANES else len(table)
         self.straight = {index: list(map(self.uniform, table[index].tolist())) for index in range(first, len(table))}
         self.first_plane = dr.opaque(self.Index, spheres)
+        self.inputs.append(self.first_plane)
 
     def uniform(self, value: float) -> Number:
         """A number that is an input of the kernel, not a part of its code."""
-        return dr.opaque(self.Float, value)
+        self.inputs.append(dr.opaque(self.Float, value))
+        return self.inputs[-1]
 
     def row(self, index: Number, active: Mask = True) -> list[Number]:
         """The numbers of a surface, fetched in packets of four, or one by one where there are few."""
@@ -140,25 +144,33 @@ def shading(scene: Scene) -> NDArray[np.float64]:
     return np.hstack([*rows, np.zeros((len(surfaces), 3))])
 
 
-def pixel_places(rows: Rows, width: int, top: int, pixel: Number) -> tuple[Number, Number]:
-    """Column and row of pixels that are counted from the start of row `top`."""
+def pixel_places(rows: Rows, width: int, pixel: Number) -> tuple[Number, Number]:
+    """Column and row of pixels that are counted row by row."""
     row, column = _divided(rows, pixel, width)
-    return rows.Float(column), rows.Float(row + dr.opaque(rows.Index, top))
+    return column, row
 
 
-def tiles(rows: Rows, width: int, count: int) -> tuple[Number, Number]:
-    """The pixels of `count` rows tile by tile, since rays that run together should follow each other; and for each
-    pixel, row by row, its place among those. Beside the last column and below the last row tiles hold other pixels.
+def tile_corners(rows: Rows, width: int, tile: Number) -> Number:
+    """Row and column of the first pixel of tiles, which are counted row by row: 16 bits each."""
+    below, beside = _divided(rows, tile, tiles_across(width))
+    return (below << 16 | beside) * TILE
+
+
+def tile_places(corner: Number, inner: Number) -> tuple[Number, Number]:
+    """Column and row of the pixels `inner` (0 to 63) of tiles with these corners.
+
+    A quarter of a tile comes after the other, since rays that run together should follow each other. Beside the last
+    column and below the last row tiles hold other pixels.
     """
-    across, down = -(-width // TILE), -(-count // TILE)
-    place = dr.arange(rows.Index, across * down * TILE * TILE)
-    tile, inner = place // (TILE * TILE), place % (TILE * TILE)
-    below, beside = _divided(rows, tile, across)
-    pixel = (TILE * below + inner // TILE) * dr.opaque(rows.Index, width) + TILE * beside + inner % TILE
+    half, quarter = TILE // 2, PIXELS // 4
+    column = (corner & 0xFFFF) + (inner // quarter % 2 * half + inner % half)
+    row = (corner >> 16) + (inner // (2 * quarter) * half + inner % quarter // half)
+    return column, row
 
-    row, column = _divided(rows, dr.arange(rows.Index, count * width), width)
-    tile = row // TILE * dr.opaque(rows.Index, across) + column // TILE
-    return pixel, (tile * TILE + row % TILE) * TILE + column % TILE
+
+def tiles_across(width: int) -> int:
+    """How many tiles stand beside each other."""
+    return -(-width // TILE)
 
 
 def _divided(rows: Rows, numbers: Number, divisor: int) -> tuple[Number, Number]:

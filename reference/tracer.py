@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from reference.device import array_types
-from reference.draft import Draft, is_draftable
+from reference.draft import is_draftable
 from reference.errors import InputError
 from reference.model import DOCUMENT, Model
+from reference.mosaic import Mosaic
 from reference.scene import LARGEST_DEPTH, LARGEST_SIDE, Scene
-from reference.tables import BAND
+from reference.tables import BAND, TILE
 from reference.world import View, World
 
 
@@ -64,13 +65,13 @@ def render_bands(
     check_request(width, height, depth)
     view = View(width, height, depth)
     artist = prepare(scene, model, precision=precision, device=device)
-    rows = max(1, BAND // width)
+    rows = max(TILE, BAND // width // TILE * TILE)  # whole tiles, so that bands make no difference
     for top in range(0, height, rows):
         count = min(rows, height - top)
         yield artist.draw(view, top, count).numpy().reshape(count, width, 3)
 
 
-def prepare(scene: Scene, model: Model = DOCUMENT, *, precision: str = "auto", device: str = "auto") -> World | Draft:
+def prepare(scene: Scene, model: Model = DOCUMENT, *, precision: str = "auto", device: str = "auto") -> World | Mosaic:
     """The scene on the device, ready to `draw` rows of any view in the precision asked for.
 
     Raises InputError and DeviceError as `render` does.
@@ -78,7 +79,7 @@ def prepare(scene: Scene, model: Model = DOCUMENT, *, precision: str = "auto", d
     types, single = array_types(precision, device), array_types("single", device)
     world = World(scene, model, types, single)
     drafted = precision == "auto" and world.tree is None and is_draftable(world.scene, model)
-    return Draft(world, single) if drafted else world
+    return Mosaic(world, single) if drafted else world
 
 
 def check_request(width: int, height: int, depth: int) -> None:

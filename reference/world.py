@@ -18,6 +18,7 @@ from reference.scene import EYE, LIGHT, SCREEN, Scene, holds_light
 from reference.tables import (
     MATERIAL,
     NOTHING,
+    PIXELS,
     UNROLLED,
     Path,
     Rows,
@@ -25,7 +26,9 @@ from reference.tables import (
     geometry,
     pixel_places,
     shading,
-    tiles,
+    tile_corners,
+    tile_places,
+    tiles_across,
     upload,
 )
 
@@ -60,7 +63,7 @@ class World(Rows):
         self.model, self.scene = model, scene
         lit = _lit(scene, spheres)
         self.light_on_sphere = bool(lit.any())
-        planes = [(*p.point, 0, *p.unit_normal, p.distance_from(LIGHT)) for p in scene.planes]
+        planes = [(*p.point, 0, *p.unit_normal, p.distance_from(model.light)) for p in scene.planes]
         rows = np.zeros((len(materials), 8))
         rows[: len(order), :6] = np.column_stack([spheres[order], lit[order], order])
         rows[len(order) :] = planes or 0
@@ -69,7 +72,7 @@ class World(Rows):
         self.materials = Rows(types, len(order), np.concatenate([materials[order], materials[len(order) :]]), MATERIAL)
         self.ambient = self.Vector(*map(self.uniform, scene.ambient))
         self.ambient_coefficient = self.uniform(scene.ambient_coefficient)
-        self.light = self.Vector(*LIGHT)
+        self.light = self.Vector(*map(self.uniform, model.light))
 
     def path(self, ray: Ray, reach: Callable[..., Number]) -> Path | None:
         """What a tree needs to know of rays; `reach` is the t beyond which nothing matters, a function of the state."""
@@ -82,22 +85,27 @@ class World(Rows):
 
     def draw(self, view: View, top: int, count: int) -> Number:
         """Red, green and blue of each pixel in turn, in `count` rows from `top` on."""
+        start = dr.opaque(self.Index, top)
         if self.tree is None:
-            return dr.ravel(self.colours(view, top, dr.arange(self.Index, count * view.width)))
-        pixel, place = tiles(self, view.width, count)
-        colour = self.colours(view, top, pixel)
-        dr.eval(colour)
-        return dr.ravel(dr.gather(self.Vector, colour, place))
+            pixel = dr.arange(self.Index, count * view.width)
+            return dr.ravel(self.colours(view, start, *pixel_places(self, view.width, pixel)))
+        inner = dr.arange(self.Index, tiles_across(view.width) * tiles_across(count) * PIXELS)
+        column, row = tile_places(tile_corners(self, view.width, inner // PIXELS), inner % PIXELS)
+        picture = dr.empty(self.Float, 3 * count * view.width)
+        inside = (column < dr.opaque(self.Index, view.width)) & (row < dr.opaque(self.Index, count))
+        pixel = dr.fma(row, dr.opaque(self.Index, view.width), column)
+        dr.scatter(picture, self.colours(view, start, column, row), pixel, inside)
+        return picture
 
-    def colours(self, view: View, top: int, pixel: Number) -> Vector:
-        """The colours of some pixels, which are counted from the start of row `top`."""
-        colour = _radiance(self, self.directions(view, top, pixel), dr.opaque(self.Index, view.depth))
-        return colour + dr.zeros(self.Vector, dr.width(pixel))  # one for each, be they all the same
+    def colours(self, view: View, top: Number, column: Number, row: Number) -> Vector:
+        """The colours of some pixels, whose rows are counted from row `top` on."""
+        colour = _radiance(self, self.directions(view, top, column, row), dr.opaque(self.Index, view.depth))
+        return colour + dr.zeros(self.Vector, dr.width(column))  # one for each, be they all the same
 
-    def directions(self, view: View, top: int, pixel: Number) -> Vector:
+    def directions(self, view: View, top: Number, column: Number, row: Number) -> Vector:
         """Directions of the camera's rays, not of unit length."""
-        size = self.uniform(2 * SCREEN / view.width), self.uniform(2 * SCREEN / view.height)
-        return self.Vector(*self.model.camera_direction(*pixel_places(self, view.width, top, pixel), *size))
+        size = (dr.opaque(self.Float, 2 * SCREEN / side) for side in (view.width, view.height))
+        return self.Vector(*self.model.camera_direction(self.Float(column), self.Float(row + top), *size))
 
 
 def _check_magnitudes(scene: Scene, spheres: NDArray[np.float64], types: Types) -> None:
@@ -130,15 +138,16 @@ def _radiance(world: World, direction: Vector, limit: Number) -> Vector:
         red, green, blue, diffuse, mirror, _, _, _ = world.materials.row(hit)
         point = dr.fma(direction, t, origin)
         sphere_normal = world.model.sphere_normal(point, world.Vector(x, y, z), radius)
-        normal = dr.select(hit < world.first_plane, sphere_normal, world.Vector(normal_x, normal_y, normal_z))
+        flat = world.model.plane_normal(point, world.Vector(x, y, z), world.Vector(normal_x, normal_y, normal_z))
+        normal = dr.select(hit < world.first_plane, sphere_normal, flat)
 
         surface = world.Vector(red, green, blue)
         to_light = world.light - point
         cosine = world.model.cosine(normal, to_light)
         shadow = Ray(point, to_light, dr.dot(to_light, to_light), hit)
         lit = (cosine != 0) & ~blocked(world, shadow, cosine != 0)
-        local = world.model.ambient(surface, world.ambient, world.ambient_coefficient)
-        local += dr.select(lit, world.model.diffuse(surface, diffuse, cosine), 0)
+        ambient = world.model.ambient(surface, world.ambient, world.ambient_coefficient)
+        local = world.model.local(ambient, world.model.diffuse(surface, diffuse, cosine), ~lit, depth)
         colour = dr.fma(local, weight, colour)
 
         depth += 1

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from reference.acceleration import LEAF, Tree
+from reference.acceleration import LEAF, ROUNDING, Tree
 from reference.device import array_types, load_drjit
 from reference.tables import upload
 
@@ -233,22 +233,36 @@ def test_near_spheres_come_first() -> None:
     assert visited.numpy().mean() < 20
 
 
+def corners(tree: Tree) -> NDArray[Any]:
+    """The boxes of all nodes' children, as rays meet them: nodes x 2 children x 2 corners x 3."""
+    node = dr.arange(TYPES.Index, tree.leaves[0])
+    numbers = np.array([value.numpy() for value in tree.corners(node, TYPES.Mask(True))], np.float64)
+    step, start = (np.array([number[0] for number in numbers]) for numbers in (tree.step, tree.start))
+    found: NDArray[Any] = numbers.T.reshape(-1, 2, 2, 3) * step + start
+    return found
+
+
+def test_boxes_are_as_fine_as_spheres_need() -> None:
+    kinds = {scene.__name__: Tree(TYPES, *scene(np.random.default_rng(1), 777)).is_coarse for scene in SCENES}
+    assert kinds == {name: name not in ("cluster", "large_and_small") for name in kinds}
+
+
 @pytest.mark.parametrize("scene", SCENES)
 def test_every_sphere_is_in_one_leaf_and_in_the_boxes_above_it(scene: Callable[..., Spheres]) -> None:
     centres, radii = scene(np.random.default_rng(1), 777)
     tree = FilledTree(TYPES, centres, radii)
     assert sorted(tree.order) == list(range(777))
-    ends, nodes = tree.ends.numpy(), tree.nodes.numpy().reshape(-1, 2, 2, 3)
+    ends, nodes = tree.ends.numpy(), corners(tree)
     assert (ends[0], ends[-1]) == (0, 777)
     assert 0 <= np.diff(ends.astype(int)).min() <= np.diff(ends.astype(int)).max() <= LEAF
-    leaves = len(nodes)
+    leaves, rounding = len(nodes), tree.extent[0] * ROUNDING / 4
     for leaf in range(leaves):
         inside = tree.order[ends[leaf] : ends[leaf + 1]]
         node = leaves + leaf
         while node > 1:
             box = nodes[node // 2, node % 2]
-            assert (box[0] <= centres[inside] - radii[inside, None]).all()
-            assert (box[1] >= centres[inside] + radii[inside, None]).all()
+            assert (box[0] <= centres[inside] - radii[inside, None] + rounding).all()
+            assert (box[1] >= centres[inside] + radii[inside, None] - rounding).all()
             node //= 2
 
 

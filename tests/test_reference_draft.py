@@ -11,7 +11,7 @@ from random_scenes import random_scene
 
 from reference import draft
 from reference.device import array_types
-from reference.draft import Draft, is_draftable, radiance
+from reference.draft import Draft, is_draftable
 from reference.model import CONVENTIONS, DOCUMENT, EXACT, PUBLISHED
 from reference.scene import Plane, Scene, Sphere
 from reference.tracer import render
@@ -40,9 +40,8 @@ def difference(scene: Scene, **options: Any) -> float:
 def share_in_doubt(scene: Scene) -> float:
     world = World(scene, DOCUMENT, array_types("double"), array_types("single"))
     drafted = Draft(world, array_types("single"))
-    view = View(300, 300, 3)
-    camera = world.directions(view, 0, dr.arange(drafted.search.Index, 90000))
-    _, doubt = radiance(drafted, camera, dr.opaque(drafted.search.Index, view.depth))
+    pixel = dr.arange(drafted.search.Index, 90000)
+    _, doubt = drafted.colours(View(300, 300, 3), pixel * 0, pixel % 300, pixel // 300)
     return float(np.mean(doubt.numpy()))
 
 
@@ -71,15 +70,14 @@ def test_few_pixels_are_in_doubt(path: Path) -> None:
 
 
 def test_without_proofs_differences_would_show(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Draft, "draw", lambda self, view, top, count: _unproven(self, view, top, count))
-    scene = Scene.load(EXAMPLES[0])
-    assert difference(scene, width=400, height=400) > 1
+    drafted = Draft.colours
 
+    def certain(self: Draft, *places: Any) -> Any:
+        colour, doubt = drafted(self, *places)
+        return colour, doubt & False
 
-def _unproven(drafted: Draft, view: View, top: int, count: int) -> object:
-    kind = drafted.search.Index
-    camera = drafted.world.directions(view, top, dr.arange(kind, count * view.width))
-    return radiance(drafted, camera, dr.opaque(kind, view.depth))[0]
+    monkeypatch.setattr(Draft, "colours", certain)
+    assert difference(Scene.load(EXAMPLES[0]), width=400, height=400) > 1
 
 
 def test_what_a_colour_may_lose_decides(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,8 +23,8 @@ from turns import Pace, Run, seconds
 
 from reference import Scene
 from reference.device import PRECISIONS as KNOWN
-from reference.draft import Draft
 from reference.errors import RendererError
+from reference.mosaic import Mosaic
 from reference.text import dump
 from reference.tracer import prepare
 from reference.world import View, World
@@ -82,7 +82,7 @@ class Task:
     def crossray(self, precision: str) -> Run:
         """Preparing the scene, and drawing it as often as wanted."""
 
-        def ready() -> World | Draft:
+        def ready() -> World | Mosaic:
             return prepare(self.scene, precision=precision, device="cpu")
 
         def draw_it() -> NDArray[np.float32]:
