@@ -69,9 +69,9 @@ def _unlike(entry: Entry, found: Mapping[tuple[str, str], Path]) -> str:
 
 def _file(scenes: Sequence[str], path: Path) -> Entry:
     """A picture named on the command line."""
-    if len(scenes) == 1:
-        return Entry(_shown(path.stem), scenes[0], path)
     student, scene = _parts(scenes, path.stem)
+    if len(scenes) == 1 and (student or not scene):
+        return Entry(_shown(path.stem), scenes[0], path)
     if not scene:
         raise InputError(f"{path}:1:1: expected a name that tells the scene, one of {', '.join(scenes)}")
     return Entry(student or _shown(path.resolve().parent.name), scene, path)

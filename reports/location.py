@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from reference.model import DOCUMENT, Window
 from reference.scene import Scene
 from reference.tracer import render
+from reference.world import View
+from reports.gradeimages import worst_channel
 
 Mask = NDArray[np.bool_]
 
@@ -25,21 +27,12 @@ _NOTHING = Window(sphere=lambda t, leaving: t > dr.inf, plane=lambda t, facing, 
 UNSHADOWED = replace(DOCUMENT, name="unshadowed", summary="nothing blocks the light", shadow=_NOTHING)
 
 
-@dataclass(frozen=True)
-class View:
-    """A picture's size in pixels and its depth limit."""
-
-    width: int
-    height: int
-    depth: int
-
-
 def locate(scene: Scene, view: View, excess: NDArray[np.floating[Any]]) -> tuple[str, ...]:
     """The features in whose region nearly all wrong pixels lie, or none: those of the smallest region.
 
     `excess` is how far each channel is off, in levels, H x W x 3, 0 where it is right.
     """
-    worst = np.asarray(excess).max(axis=-1)
+    worst = worst_channel(np.asarray(excess))
     wrong = worst > 0
     if not wrong.any():
         return ()
@@ -90,7 +83,7 @@ def _grown(mask: Mask, by: int) -> Mask:
 
 def _differ(one: NDArray[Any], other: NDArray[Any]) -> Mask:
     """Where they do by more than half a level, and next to that, as far as JPEG and antialiasing smear it."""
-    return _grown((np.abs(one - other) > 0.5).any(axis=-1), 1)
+    return _grown(worst_channel(np.abs(one - other)) > 0.5, 1)
 
 
 def _draw(scene: Scene, view: View, model: Any) -> NDArray[np.float64]:

@@ -126,11 +126,12 @@ def test_links_and_doubles_are_left_out(tmp_path: Path) -> None:
 
 def test_named_files(tmp_path: Path) -> None:
     folder = files(tmp_path, "anna.png", "b/anna.png", "handed/example1.png", "handed/example2.png")
-    pictures = [folder / "anna.png", folder / "b" / "anna.png", folder / "missing.png"]
+    pictures = [folder / "anna.png", folder / "b" / "anna.png", folder / "missing.png", folder / "handed/example1.png"]
     assert told(collect(["example1"], pictures), folder) == [
         ("anna", "example1", "anna.png"),
         ("anna (2)", "example1", "b/anna.png"),
         ("missing", "example1", "missing.png"),
+        ("handed", "example1", "handed/example1.png"),
     ]
     pictures = [folder / "handed" / "example1.png", folder / "handed" / "example2.png"]
     assert told(collect(SCENES, pictures), folder) == [

@@ -9,10 +9,11 @@ from helpers import ROOT, scene_of
 from numpy.typing import NDArray
 
 from reference import DOCUMENT, Model, Scene, Sphere, render
+from reference.world import View
 from reports.credit import POINTS, mark
 from reports.gradebook import students_of
 from reports.gradescope import gradescope
-from reports.location import UNSHADOWED, View, locate
+from reports.location import UNSHADOWED, locate
 
 SIDE = 100
 SCENE = Scene.load(ROOT / "scenes" / "example1.txt")

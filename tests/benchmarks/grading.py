@@ -20,7 +20,7 @@ import tempfile
 import time
 from pathlib import Path
 
-import reference
+import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 EXAMPLES = [ROOT / "scenes" / f"example{number}.txt" for number in (1, 2, 3, 4)]
@@ -34,8 +34,10 @@ def hand_in(folder: Path, students: int, side: int) -> None:
     """Make the class's pictures. Each wrong picture is drawn once and saved for all who make that mistake."""
     from PIL import Image
 
-    from reference import Scene
-    from reference.mistakes import MISTAKES, View
+    from reference import Scene, render
+    from reference.image import quantise
+    from reference.mistakes import MISTAKES
+    from reference.world import View
 
     luck = random.Random(7)
     ids = sorted(MISTAKES)
@@ -46,9 +48,8 @@ def hand_in(folder: Path, students: int, side: int) -> None:
         drawn = {}
         for number, choice in enumerate(chosen):
             if choice not in drawn:
-                mistake = MISTAKES[choice] if choice else None
-                pixels = mistake.finish(mistake.draw(scene, view)) if mistake else right(scene, side)
-                drawn[choice] = Image.fromarray(pixels)
+                levels = MISTAKES[choice].draw(scene, view) if choice else render(scene, width=side, height=side)
+                drawn[choice] = Image.fromarray(quantise(np.asarray(levels)))
             data = io.BytesIO()
             if luck.random() < 0.3:
                 drawn[choice].save(data, "PNG", compress_level=1)
@@ -58,13 +59,6 @@ def hand_in(folder: Path, students: int, side: int) -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             whole = data.getvalue()
             target.write_bytes(whole[: len(whole) // 2] if luck.randrange(BROKEN) == 0 else whole)
-
-
-def right(scene: reference.Scene, side: int) -> object:
-    from reference import render
-    from reference.image import quantise
-
-    return quantise(render(scene, width=side, height=side))
 
 
 def memory(process: int) -> int:
