@@ -12,11 +12,12 @@ from dataclasses import dataclass, field, replace
 from math import atan, degrees, radians, tan
 from typing import Any
 
+import drjit as dr
 import numpy as np
 
 from reference import slips
 from reference.model import DOCUMENT, GRAZING, SHIFT, Model, beyond
-from reference.scene import LIGHT, SCREEN, SCREEN_DISTANCE, Scene
+from reference.scene import LIGHT, SCREEN, SCREEN_DISTANCE, Scene, merge_coincident
 from reference.slips import Levels, draw
 from reference.world import View
 
@@ -305,7 +306,7 @@ MISTAKES = {
         "Diffuse light is added where nothing stands before the light.",
         "shadows",
         "example1",
-        {"local": lambda ambient, diffuse, dark, depth: ambient + slips.dr.select(dark, diffuse, 0)},
+        {"local": lambda ambient, diffuse, dark, depth: ambient + dr.select(dark, diffuse, 0)},
     ),
     "S7": Mistake(
         "planes cast no shadow",
@@ -321,7 +322,7 @@ MISTAKES = {
         "A mirrored colour is computed as any other, shadow ray included.",
         "shadows",
         "example1",
-        {"local": lambda ambient, diffuse, dark, depth: ambient + slips.dr.select(dark & (depth == 0), 0, diffuse)},
+        {"local": lambda ambient, diffuse, dark, depth: ambient + dr.select(dark & (depth == 0), 0, diffuse)},
     ),
     "S9": Mistake(
         "ambient light is lost in shadow",
@@ -331,7 +332,7 @@ MISTAKES = {
         "example1",
         {
             "cosine": slips.sine_or_cosine(slips.at_least(slips.TINY)),
-            "local": lambda ambient, diffuse, dark, depth: slips.dr.select(dark, 0, ambient + diffuse),
+            "local": lambda ambient, diffuse, dark, depth: dr.select(dark, 0, ambient + diffuse),
         },
     ),
     "S9/2": Mistake(
@@ -343,7 +344,7 @@ MISTAKES = {
         {
             "shadow": slips.skipping(SHADOW),
             "cosine": slips.sine_or_cosine(slips.at_least(slips.TINY)),
-            "local": lambda ambient, diffuse, dark, depth: slips.dr.select(dark, 0, ambient + diffuse),
+            "local": lambda ambient, diffuse, dark, depth: dr.select(dark, 0, ambient + diffuse),
         },
     ),
     "S10": Mistake(
@@ -354,7 +355,7 @@ MISTAKES = {
         "coloured_ambient",
         {
             "cosine": slips.sine_or_cosine(slips.at_least(slips.TINY)),
-            "local": lambda ambient, diffuse, dark, depth: (ambient + diffuse) * slips.dr.select(dark, 0.2, 1),
+            "local": lambda ambient, diffuse, dark, depth: (ambient + diffuse) * dr.select(dark, 0.2, 1),
         },
     ),
     "L1": Mistake(
@@ -671,7 +672,7 @@ def ambient_of(value: float) -> Mistake:
         MISTAKES["A2"],
         looks="shadows are too light or too dark",
         hint="Use the ambient coefficient that the file gives in its second line.",
-        steps={"surfaces": lambda scene: replace(slips.merge_coincident(scene), ambient_coefficient=value)},
+        steps={"surfaces": lambda scene: replace(merge_coincident(scene), ambient_coefficient=value)},
     )
 
 

@@ -283,10 +283,10 @@ def tinted_reflection(scene: Scene, model: Model, view: View) -> Levels:
     def mirror(channel: int) -> Callable[[Any], Any]:
         return lambda surface: replace(surface, reflection=surface.reflection * surface.colour[channel] / 255)
 
-    channels = [
-        draw(scene, replace(model, surfaces=lambda s, c=channel: each(mirror(c))(model.surfaces(s))), view)
-        for channel in range(3)
-    ]
+    def read(channel: int) -> Callable[[Scene], Scene]:
+        return lambda scene: each(mirror(channel))(model.surfaces(scene))
+
+    channels = [draw(scene, replace(model, surfaces=read(channel)), view) for channel in range(3)]
     return np.stack([picture[:, :, channel] for channel, picture in enumerate(channels)], axis=-1)
 
 

@@ -23,6 +23,8 @@ from reference.model import DOCUMENT
 from reference.scene import LIGHT, Scene
 from reference.slips import draw, missing
 from reference.world import View
+from reports.submission import Facts
+from reports.verdict import store
 
 Levels = NDArray[np.float32]
 
@@ -36,6 +38,8 @@ GUESS = 0.25  # the least share of a cause that is listed
 LEFT = 0.004  # of the difference: what is left unexplained that tells nothing
 PAIR_COST, FIT_COST = 1.7, 1.3  # how many times as much a second mistake, or a number, must explain of what is left
 PLAIN, FEW = 5.0, 0.002  # levels that a block is off beyond doubt, and the share of blocks that may be
+AUDIBLE = 1.1  # times the noise of its file: what a difference must be at least
+SURE = 0.985  # the share of a JPEG's difference from which on nothing else is looked for
 LISTED = 5
 PAIRED = 8  # pairs that are drawn
 PROMISING = 0.97  # of the difference may be left by a family's best number for it to be looked into
@@ -77,11 +81,12 @@ class Suspects:
         shrink = -(-max(view.width, view.height) // LARGEST)
         self.view = replace(view, width=-(-view.width // shrink), height=-(-view.height // shrink))
         self.block = max(1, min(self.view.width, self.view.height) // COARSE)
+        self._noise: dict[Any, float] = {}
         self.rough = self.block * ROUGH
         self.small = replace(self.view, width=self.view.width // self.rough, height=self.view.height // self.rough)
 
     def draw(self, mistake: Mistake, *, roughly: bool = False) -> Levels | None:
-        """The picture that a mistake makes, as bytes have it, in blocks, or `roughly` one ray a block; None for none."""
+        """The picture that a mistake makes, as in a file, in blocks; or `roughly`, by few rays. None for none."""
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             try:
@@ -102,6 +107,13 @@ class Suspects:
     def right(self) -> Levels:
         """The right picture in blocks."""
         return blocks(as_bytes(draw(self.scene, DOCUMENT, self.view)), self.block)
+
+    def noise(self, facts: Facts) -> float:
+        """How far the right picture is from itself, once it has been through a file with these facts."""
+        if facts.tables not in self._noise:
+            whole = as_bytes(draw(self.scene, DOCUMENT, self.view))
+            self._noise[facts.tables] = distance(blocks(store(whole, facts), self.block), self.right)
+        return self._noise[facts.tables]
 
     @cached_property
     def singles(self) -> list[Hypothesis]:
@@ -143,8 +155,8 @@ def blocks(levels: NDArray[Any], size: int) -> Levels:
     height, width = (side // size * size for side in levels.shape[:2])
     if size == 1:
         return np.asarray(levels, np.float32)
-    columns = sum(levels[:height, first:width:size] for first in range(size))
-    return np.asarray(sum(columns[first::size] for first in range(size)) / size**2, np.float32)
+    parts = levels[:height, :width].reshape(height // size, size, width // size, size, -1)
+    return np.asarray(np.add.reduce(np.add.reduce(parts, 3, np.float32), 1) / size**2, np.float32)
 
 
 def distance(one: Levels, other: Levels) -> float:
@@ -158,20 +170,26 @@ def off(error: Levels) -> NDArray[np.float32]:
     return np.asarray(np.minimum(np.maximum(worst - QUIET, 0), MOST), np.float32)
 
 
-def diagnose(suspects: Suspects, levels: NDArray[Any]) -> list[Cause]:
-    """The likeliest causes of a wrong picture (height x width x 3, in levels), most likely first; maybe none."""
+def diagnose(suspects: Suspects, levels: NDArray[Any], facts: Facts) -> list[Cause]:
+    """The likeliest causes of a wrong picture (height x width x 3, in levels), most likely first; maybe none.
+
+    What its format alone would do to the right picture is no difference that a cause could explain.
+    """
     picture = suspects.blocks_of(levels)
-    base = distance(picture, suspects.right)
+    base, noise = distance(picture, suspects.right), suspects.noise(facts)
     if base <= 0:
         return []
+    if base < AUDIBLE * noise:
+        noise = 0.0
 
     def share(hypothesis: Hypothesis) -> float:
-        return 1 - distance(picture, hypothesis.blocks) / base
+        return 1 - max(0.0, distance(picture, hypothesis.blocks) - noise) / (base - noise)
 
     found = [(share(single), single) for single in suspects.singles]
-    found += [(part, speck) for part, speck in _speckles(suspects, picture, levels, base)]
+    found += [(share(speck), speck) for speck in _speckles(suspects, levels)]
+    enough = SURE if noise else 1 - 2 * LEFT
     for further in (_fitted, _pairs):
-        if not _is_settled(picture, max(found, key=lambda pair: pair[0], default=None)):
+        if not _is_settled(picture, enough, max(found, key=lambda pair: pair[0], default=None)):
             found += [(share(one), one) for one in further(suspects, picture, found)]
     found.sort(key=lambda pair: pair[1].rank(pair[0]))
     causes: list[Cause] = []
@@ -182,11 +200,11 @@ def diagnose(suspects: Suspects, levels: NDArray[Any]) -> list[Cause]:
     return causes[:LISTED]
 
 
-def _is_settled(picture: Levels, best: tuple[float, Hypothesis] | None) -> bool:
+def _is_settled(picture: Levels, enough: float, best: tuple[float, Hypothesis] | None) -> bool:
     """Whether what the best hypothesis leaves is no more than JPEG and antialiasing may do."""
     if best is None or best[0] < NAMED:
         return False
-    return best[0] > 1 - 2 * LEFT or float(np.mean(off(np.abs(picture - best[1].blocks)) > PLAIN)) < FEW
+    return best[0] > enough or float(np.mean(off(np.abs(picture - best[1].blocks)) > PLAIN)) < FEW
 
 
 def _cause(share: float, hypothesis: Hypothesis) -> Cause:
@@ -205,9 +223,7 @@ def _cause(share: float, hypothesis: Hypothesis) -> Cause:
     )
 
 
-def _speckles(
-    suspects: Suspects, picture: Levels, levels: NDArray[Any], base: float
-) -> Iterator[tuple[float, Hypothesis]]:
+def _speckles(suspects: Suspects, levels: NDArray[Any]) -> Iterator[Hypothesis]:
     """Mistakes that come and go: pixels are right, or just as the mistake has them, side by side."""
     full = resized(levels, suspects.view)
     right = as_bytes(draw(suspects.scene, DOCUMENT, suspects.view))
@@ -223,8 +239,7 @@ def _speckles(
         if as_told.sum() < SPECKS * wrong.sum() or wrong.sum() > 0.95 * can.sum():
             continue
         mixed = np.where(as_told[..., None], marred, right)
-        hypothesis = Hypothesis((id_,), (mistake,), blocks(mixed, suspects.block))
-        yield 1 - distance(picture, hypothesis.blocks) / base, hypothesis
+        yield Hypothesis((id_,), (mistake,), blocks(mixed, suspects.block))
 
 
 def _fitted(suspects: Suspects, picture: Levels, found: Any) -> Iterator[Hypothesis]:

@@ -102,7 +102,7 @@ def _wrong(
     outside = int((worst_channel(excess) > 0).sum())
     where = _where(bounds, excess)
     advice = _what_else(task, submission.levels)
-    found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels)
+    found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels, submission.facts)
     causes = [_cause(cause, where) for cause in _telling(found)]
     features: list[str] = next((cause["features"] for cause in causes if cause["named"]), [])
     if not features and not advice:

@@ -212,7 +212,9 @@ def _offset(envelope: Envelope, found: Levels, stored: list[Levels], facts: Fact
     enough = count[..., 0] >= side * side // 3
     if not enough.any():
         return 0.0, np.zeros((height, width), bool)
-    means = [_sums((picture - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1) for picture in stored[:4]]
+    means = [
+        _sums((picture - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1) for picture in stored[:4]
+    ]
     mean = _sums((found - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1)
     steps = [table[0] for table in facts.tables[:1] + facts.tables[-1:]]  # of a block's mean, times 8
     most = MEAN + sum(steps) / 16 + (0.5 if facts.lossy else 0)

@@ -5,10 +5,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from helpers import ROOT
+from mistakes import MISTAKES, SIDE
 from numpy.typing import NDArray
 from PIL import Image
 
-from mistakes import MISTAKES, SIDE
 from reference import Scene, render
 from reference.errors import InputError
 from reference.image import quantise
@@ -16,8 +17,6 @@ from reports.envelope import Envelope, envelope
 from reports.resemblance import unlike
 from reports.submission import Facts, Submission, read_submission
 from reports.verdict import judge
-
-from helpers import ROOT
 
 EXAMPLES = [f"example{number}" for number in range(1, 5)]
 SCENES = [*EXAMPLES, "diagnostic/facing_mirrors", "diagnostic/thin_gap", "diagnostic/plane_shadow"]
