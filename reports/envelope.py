@@ -14,10 +14,11 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.device import array_types
 from reference.model import DOCUMENT
 from reference.scene import Scene, Triple
-from reference.tracer import prepare, render
-from reference.world import View
+from reference.tracer import render
+from reference.world import View, World
 
 SAMPLES = 4  # across a pixel
 CORNER = 0.499  # pixels from the centre: whatever line crosses the pixel, there is a corner on either side
@@ -45,12 +46,12 @@ class Envelope:
     @property
     def width(self) -> int:
         """In pixels."""
-        return self.low.shape[1]
+        return int(self.low.shape[1])
 
     @property
     def height(self) -> int:
         """In pixels."""
-        return self.low.shape[0]
+        return int(self.low.shape[0])
 
 
 def envelope(scene: Scene, width: int, height: int, depth: int = 3) -> Envelope:
@@ -59,7 +60,8 @@ def envelope(scene: Scene, width: int, height: int, depth: int = 3) -> Envelope:
     Raises InputError and DeviceError as `reference.tracer.render` does.
     """
     centre = np.clip(render(scene, width=width, height=height, depth=depth), 0, 255)
-    view, world = View(width, height, depth), prepare(scene, precision="double")
+    view, types = View(width, height, depth), array_types("double", "auto")
+    world = World(scene, DOCUMENT, types, types)
     low = high = world.Vector(*(world.Float(np.ascontiguousarray(centre[..., c].ravel())) for c in range(3)))
     pixel = dr.arange(world.Index, width * height)
     across = dr.opaque(world.Index, width)
@@ -73,8 +75,8 @@ def envelope(scene: Scene, width: int, height: int, depth: int = 3) -> Envelope:
             low, high = dr.minimum(low, colour), dr.maximum(high, colour)
             mean = dr.fma(colour, dr.opaque(world.Float, weight), mean)
             dr.eval(low, high, mean)
-    pictures = [side.numpy().T.reshape(height, width, 3).astype(np.float32) for side in (mean, low, high)]
-    return Envelope(scene, depth, centre, *pictures, *identify(scene, view))
+    over = [side.numpy().T.reshape(height, width, 3).astype(np.float32) for side in (mean, low, high)]
+    return Envelope(scene, depth, centre, over[0], over[1], over[2], *identify(scene, view))
 
 
 def identify(scene: Scene, view: View) -> tuple[NDArray[np.uint16], tuple[str, ...]]:
@@ -82,7 +84,6 @@ def identify(scene: Scene, view: View) -> tuple[NDArray[np.uint16], tuple[str, .
 
     Drawn with the number of each surface as its colour.
     """
-    surfaces = [*scene.spheres, *scene.planes]
     names = [f"sphere {number}" for number in range(1, len(scene.spheres) + 1)]
     names += [f"plane {number}" for number in range(1, len(scene.planes) + 1)]
 
@@ -90,8 +91,9 @@ def identify(scene: Scene, view: View) -> tuple[NDArray[np.uint16], tuple[str, .
         colour: Triple = (float(number), 0.0, 0.0)
         return {"colour": colour, "diffuse": 0.0, "reflection": 0.0}
 
-    painted = [replace(surface, **numbered(number)) for number, surface in enumerate(surfaces, 1)]
-    spheres, planes = painted[: len(scene.spheres)], painted[len(scene.spheres) :]
-    flat = replace(scene, spheres=tuple(spheres), planes=tuple(planes))
+    first = len(scene.spheres) + 1
+    spheres = tuple(replace(sphere, **numbered(number)) for number, sphere in enumerate(scene.spheres, 1))
+    planes = tuple(replace(plane, **numbered(number)) for number, plane in enumerate(scene.planes, first))
+    flat = replace(scene, spheres=spheres, planes=planes)
     seen = render(flat, UNLIT, width=view.width, height=view.height, depth=0)[..., 0]
     return np.rint(seen).astype(np.uint16), ("background", *names)

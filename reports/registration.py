@@ -40,13 +40,13 @@ def displacement(envelope: Envelope, found: NDArray[np.float32]) -> Displacement
     if min(height, width) < 3:
         return Displacement(0, 0, 0, 0, 0, False)
     difference = found.sum(axis=-1) - mean
-    down, right = np.gradient(mean)
+    vertical, horizontal = np.gradient(mean)
     edges = (envelope.high - envelope.low).max(axis=-1) > 4
     rows, columns = np.nonzero(edges)
     if rows.size == 0:
         return Displacement(0, 0, 0, 0, 0, False)
     across, along = (columns + 0.5) / width * 2 - 1, (rows + 0.5) / height * 2 - 1
-    gx, gy = right[rows, columns].astype(float), down[rows, columns].astype(float)
+    gx, gy = horizontal[rows, columns].astype(float), vertical[rows, columns].astype(float)
     design = -np.column_stack([gx, gy, gx * across, gy * along])
     target = difference[rows, columns].astype(float)
     normal = design.T @ design
@@ -64,4 +64,5 @@ def displacement(envelope: Envelope, found: NDArray[np.float32]) -> Displacement
     different = float(target @ target) > DIFFERENT * float(usual @ usual)
     sure = (np.abs(fitted) > LEAST) & (np.abs(fitted) > SURE * error)
     significant = bool(sure.any()) and different and used >= TILES and explained > EXPLAINED
-    return Displacement(*map(float, fitted), explained, significant)
+    right, down, wider, taller = map(float, fitted)
+    return Displacement(right, down, wider, taller, explained, significant)

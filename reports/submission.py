@@ -22,6 +22,7 @@ LOSSY = ("WEBP",)  # that tell nothing of their quality
 SUBSAMPLINGS = {0: "4:4:4", 1: "4:2:2", 2: "4:2:0"}  # Pillow's numbers
 EXR = b"v/1\x01"
 PNG = b"\x89PNG\r\n\x1a\n"
+MARKS = (PNG, b"\xff\xd8", b"GIF8", b"RIFF", b"II*\0", b"MM\0*")  # of pictures, at the start
 PNG_DEPTH = 24  # where a PNG says how many bits a sample has
 
 Levels = NDArray[np.float32]
@@ -107,7 +108,7 @@ def _check_size(path: str | Path, width: int, height: int) -> None:
 
 def _describe(start: bytes) -> str:
     """What a file that is no picture looks like."""
-    if start.startswith((b"\xff\xd8", PNG)):
+    if start.startswith(MARKS):
         return "the start of one that is damaged or breaks off"
     for name, mark in (("a PDF", b"%PDF"), ("a ZIP archive", b"PK\3\4"), ("a web page", b"<!DOCTYPE html")):
         if start[: len(mark)].lower() == mark.lower():

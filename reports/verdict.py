@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -53,7 +53,7 @@ class Verdict:
     """What was found. `outside` is how far each channel is out of what the picture may show: H x W x 3, in levels."""
 
     right: bool
-    rounding: bool  # right, but some pixels are one level off
+    rounding: bool  # right, but more pixels than a few are a level off
     reasons: tuple[str, ...]  # of blobs, specks, offset, displaced
     blobs: tuple[Blob, ...]  # the largest first, at most 50
     blob_count: int
@@ -66,21 +66,22 @@ class Verdict:
     @cached_property
     def count(self) -> int:
         """How many pixels are outside by more than counts."""
-        return int((self.outside.max(axis=-1) > OUTSIDE).sum())
+        return int((_worst(self.outside) > OUTSIDE).sum())
 
 
 def judge(envelope: Envelope, submission: Submission) -> Verdict:
     """Compare a picture with the envelope of its own size. Raises InputError for any other size."""
     found, facts = submission.levels, submission.facts
     if found.shape != envelope.low.shape:
-        sizes = [f"{shape[1]}x{shape[0]}" for shape in (envelope.low.shape, found.shape)]
-        raise InputError(f"expected a picture of {sizes[0]} pixels, found {sizes[1]}")
+        asked, given = (f"{shape[1]}x{shape[0]}" for shape in (envelope.low.shape, found.shape))
+        raise InputError(f"expected a picture of {asked} pixels, found {given}")
     right = quantise(envelope.centre)
-    stored = [store(guess, facts) for guess in _guesses(envelope)]
+    guesses = _guesses(envelope)
+    stored = [store(guess, facts) for guess in guesses]
     exact = _is_exact(found, stored, facts)
-    low, high = _bounds(envelope, facts, stored, exact)
+    low, high = _bounds(envelope, facts, guesses, stored, exact)
     outside = np.maximum(np.maximum(low - found, found - high), 0)
-    wrong = outside.max(axis=-1) > OUTSIDE
+    wrong = _worst(outside) > OUTSIDE
     labels, sizes = _label(wrong)
     large = np.flatnonzero(sizes > (4 * BLOB if facts.lossy and exact else BLOB))
     offset, area = _offset(envelope, found, stored, facts)
@@ -94,9 +95,9 @@ def judge(envelope: Envelope, submission: Submission) -> Verdict:
     named = tuple(name for name, holds in reasons.items() if holds)
     order = large[np.argsort(-sizes[large], kind="stable")]
     blobs = _describe(envelope, outside, labels, [int(n) + 1 for n in order[:LISTED]])
-    off = not facts.lossy and bool((np.abs(found - right) >= 0.75).any())
+    off = not facts.lossy and np.mean(_worst(np.abs(found - right)) >= 0.75) > SPECKS
     return Verdict(
-        not named, not named and exact and off, named, blobs, int(large.size), outside, offset, area, moved, exact
+        not named, bool(not named and exact and off), named, blobs, int(large.size), outside, offset, area, moved, exact
     )
 
 
@@ -132,25 +133,26 @@ def _is_exact(found: Levels, stored: list[Levels], facts: Facts) -> bool:
     for a JPEG.
     """
     side, least = (_block(facts), SAME_BLOCKS) if facts.tables else (1, SAME_PIXELS)
-    telling = _blocks(np.abs(stored[2] - stored[1]).max(axis=-1), side) > 2 * OUTSIDE
-    off = [_blocks(np.abs(found - picture).max(axis=-1), side) for picture in stored[:2]]
+    telling = _blocks(_worst(np.abs(stored[2] - stored[1])), side) > 2 * OUTSIDE
+    off = [_blocks(_worst(np.abs(found - picture)), side) for picture in stored[:2]]
     same = np.min(off, axis=0) <= 2 * ROUNDING
-    return bool(telling.sum() >= TELLING and same[telling].mean() >= least)
+    return bool(same[telling].mean() >= least if telling.sum() >= TELLING else same.all())
 
 
-def _bounds(envelope: Envelope, facts: Facts, stored: list[Levels], exact: bool) -> tuple[Levels, Levels]:
+def _bounds(
+    envelope: Envelope, facts: Facts, guesses: list[Levels], stored: list[Levels], exact: bool
+) -> tuple[Levels, Levels]:
     """The least and the most of each channel that the file may hold."""
     if exact:
-        slack = ROUNDING + (2 if facts.lossy else 0)
+        about = ROUNDING + (2 if facts.lossy else 0)
         centres = [stored[0], stored[1], *stored[4:]] if facts.lossy else stored[:1]
-        return np.min(centres, axis=0) - slack, np.max(centres, axis=0) + slack
+        return reduce(np.minimum, centres) - about, reduce(np.maximum, centres) + about
     low, high = envelope.low - ROUNDING, envelope.high + ROUNDING
     if not facts.tables:
-        slack = 24.0 if facts.lossy else 0.0
-        return low - slack, high + slack
-    guesses = _guesses(envelope)
-    error = np.max([np.abs(after - before) for after, before in zip(stored[:4], guesses, strict=False)], axis=0)
-    slack = 1.25 * _over_blocks(error, _block(facts)) + 2
+        unknown = 24 if facts.lossy else 0
+        return low - unknown, high + unknown
+    error = reduce(np.maximum, [np.abs(after - before) for after, before in zip(stored[:4], guesses, strict=False)])
+    slack = (1.25 * _over_blocks(error, _block(facts)) + 2).astype(np.float32)
     return low - slack, high + slack
 
 
@@ -167,8 +169,15 @@ def _over_blocks(error: NDArray[Any], side: int) -> NDArray[Any]:
     return np.asarray(ndimage.maximum_filter(spread, size=(5, 5, 1)))
 
 
+def _worst(levels: NDArray[Any]) -> NDArray[Any]:
+    """The largest of three channels, four times as fast as `max`."""
+    return np.asarray(np.maximum(np.maximum(levels[..., 0], levels[..., 1]), levels[..., 2]))
+
+
 def _blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
     """The largest of each block."""
+    if side == 1:
+        return values
     height, width, *channels = values.shape
     padded = np.pad(values, [(0, -height % side), (0, -width % side), *[(0, 0)] * len(channels)])
     rows, columns = padded.shape[0] // side, padded.shape[1] // side
@@ -182,7 +191,7 @@ def _label(wrong: Mask) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
 
 
 def _describe(envelope: Envelope, outside: Levels, labels: NDArray[np.int32], numbers: list[int]) -> tuple[Blob, ...]:
-    excess, places, blobs = outside.max(axis=-1), ndimage.find_objects(labels), []
+    excess, places, blobs = _worst(outside), ndimage.find_objects(labels), []
     for number in numbers:
         rows, columns = places[number - 1]
         inside = labels[rows, columns] == number
@@ -203,11 +212,12 @@ def _offset(envelope: Envelope, found: Levels, stored: list[Levels], facts: Fact
     """
     height, width, _ = found.shape
     side = max(16, min(height, width) // 16)
-    edges = (envelope.high - envelope.low).max(axis=-1, keepdims=True) > FLAT
+    edges = _worst(envelope.high - envelope.low)[..., None] > FLAT
     if facts.lossy:  # an edge disturbs its whole block
         edges = _over_blocks(np.repeat(edges, 3, axis=-1), _block(facts))
     smooth = ~edges.any(axis=-1)
-    smooth &= (envelope.centre.max(axis=-1) < 254) & (envelope.centre.max(axis=-1) > 1)
+    brightest = _worst(envelope.centre)
+    smooth &= (brightest < 254) & (brightest > 1)
     count = _sums(smooth[..., None].astype(np.float32), side)
     enough = count[..., 0] >= side * side // 3
     if not enough.any():
