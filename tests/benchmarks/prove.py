@@ -201,9 +201,9 @@ def page(tallies: dict[str, Tally], names: list[str], side: int) -> str:
     rules = list(next(iter(tallies.values())).rules)
     lines = [
         "# How well wrong pictures are told from right ones\n",
-        f"Written by `make prove`: {len(names)} scenes (the examples and the diagnostic scenes) at {side} x {side}. Every"
-        " mistake of the bank is planted in every scene in which it puts more than 0.05 % of the pixels off by more than"
-        f" {VISIBLE} levels. Pictures are made by this program; others' pictures are in the tests.\n",
+        f"Written by `make prove`: {len(names)} scenes (the examples and the diagnostic scenes) at {side} x {side}."
+        " Every mistake of the bank is planted in every scene in which it puts more than 0.05 % of the pixels off by"
+        f" more than {VISIBLE} levels. The pictures are made by crossray's own tracer.\n",
         "| pictures | pass | " + " | ".join(rules) + " | cause first | in the first three |",
         "|---|---|" + "---|" * (len(rules) + 2),
     ]
@@ -226,8 +226,8 @@ def page(tallies: dict[str, Tally], names: list[str], side: int) -> str:
             lines += [f"- {text}" for text in tally.failed]
     lines += [
         "",
-        "SSIM after Wang (Gaussian, sigma 1.5), its mean; FLIP at 67 pixels a degree, its mean; idiff as in Open Shading"
-        " Language's tests: 10 % of pixels over .004, none over .1.",
+        "SSIM after Wang (Gaussian, sigma 1.5), its mean; FLIP at 67 pixels a degree, its mean; idiff as in Open"
+        " Shading Language's tests: 10 % of pixels over .004, none over .1.",
     ]
     return "\n".join(lines) + "\n"
 
