@@ -217,13 +217,27 @@ MISTAKES = {
         "example1",
         {"plane_arm": lambda point, origin: point},
     ),
+    "P1/2": Mistake(
+        "the direction of the ray is subtracted where it meets a plane, not its start",
+        "planes are in the wrong place",
+        "t = (q - o).n / d.n: subtract the ray's origin o, not its direction d.",
+        "occlusion",
+        "example1",
+        {
+            "plane_arm": lambda point, origin: point,
+            "plane_distance": lambda q, normal, facing, leaving: dr.dot(q, normal) / facing - 1,
+        },
+    ),
     "P2": Mistake(
         "planes have t of the wrong sign",
         "planes vanish",
         "t = (q - o).n / d.n, with q a point of the plane and o the start of the ray.",
         "occlusion",
         "example1",
-        {"plane_arm": lambda point, origin: origin - point},
+        {
+            "plane_arm": lambda point, origin: origin - point,
+            "plane_distance": lambda q, normal, facing, leaving: dr.dot(q, normal) / facing,
+        },
     ),
     "P3": Mistake(
         "a plane's normal is taken from its point to where it is met",
@@ -271,8 +285,8 @@ MISTAKES = {
         {
             "shadow": replace(
                 SHADOW,
-                sphere=lambda t, leaving: (t < 1) & (t != 0),
-                plane=lambda t, facing, leaving: (t < 1) & (t != 0),
+                sphere=lambda t, leaving: t < 1,
+                plane=lambda t, facing, leaving: t < 1,
             )
         },
     ),
@@ -354,6 +368,18 @@ MISTAKES = {
         "shadows",
         "coloured_ambient",
         {
+            "cosine": slips.sine_or_cosine(slips.at_least(slips.TINY)),
+            "local": lambda ambient, diffuse, dark, depth: (ambient + diffuse) * dr.select(dark, 0.2, 1),
+        },
+    ),
+    "S10/2": Mistake(
+        "shadow scales the whole colour",
+        "shadows have the wrong brightness",
+        "In shadow the diffuse part is 0 and the ambient part is whole.",
+        "shadows",
+        "coloured_ambient",
+        {
+            "shadow": slips.skipping(SHADOW),
             "cosine": slips.sine_or_cosine(slips.at_least(slips.TINY)),
             "local": lambda ambient, diffuse, dark, depth: (ambient + diffuse) * dr.select(dark, 0.2, 1),
         },
@@ -499,6 +525,14 @@ MISTAKES = {
         "example1",
         {"reflection": slips.touching(REFLECTION)},
         speckled=True,
+    ),
+    "R4/2": Mistake(
+        "reflected rays meet the surface that they leave",
+        "brightened mirrors",
+        "Start a little off the surface: count hits from t > 0.0001 on.",
+        "reflections",
+        "example1",
+        {"reflection": slips.touching(REFLECTION)},
     ),
     "R5": Mistake(
         "t > 1 is asked of reflected rays, too",

@@ -122,7 +122,7 @@ class Suspects:
         return [
             Hypothesis((id_,), (mistake,), picture)
             for id_, mistake, picture in drawn
-            if picture is not None and distance(picture, self.right) > 0
+            if picture is not None and not mistake.speckled and distance(picture, self.right) > 0
         ]
 
     @cached_property

@@ -71,7 +71,7 @@ def last_listed_first(scene: Scene) -> Scene:
     return merge_coincident(replace(scene, spheres=scene.spheres[::-1], planes=scene.planes[::-1]))
 
 
-HIDDEN = ("C8", "C9", "C10", "I4", "P4", "P5", "S3", "S5", "S7", "L8", "A1", "R5", "R7")
+HIDDEN: tuple[str, ...] = ("C8", "C9", "C10", "I4", "P4", "P5", "S3", "S5", "S7", "L8", "A1", "R5", "R7")
 HIDDEN += ("R12/0", "R12/1", "R12/2", "R13", "Q1", "Q2", "Q3")
 
 
