@@ -10,7 +10,7 @@ HAS_ATOMIC := $(PYTHON) -c 'import ctypes; ctypes.CDLL("libatomic.so.1")'
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help report test lint bench soundness docs pictures lock renderers cycles compiler browser clean
+.PHONY: help report test lint bench prove soundness docs pictures lock renderers cycles compiler browser clean
 
 help:  ## Say what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -28,6 +28,9 @@ lint: $(READY)
 
 bench: $(READY) renderers compiler  ## Time the tracer beside its peers and write docs/benchmarks.md (15 minutes)
 	$(BIN)/python tests/benchmarks/bench.py
+
+prove: $(READY)  ## Prove that wrong pictures are told from right ones and write docs/power.md (half an hour)
+	$(BIN)/python tests/benchmarks/prove.py
 
 soundness: $(READY)  ## Prove certified pixels a second time, every one, with Arb (minutes)
 	$(BIN)/python tests/benchmarks/soundness.py

@@ -392,6 +392,90 @@ def compare(a: Path, b: Path, out: Path | None, quiet: bool, verbose: bool) -> N
 
 
 @app.command()
+@click.argument("paths", nargs=-1, required=True, type=PATH, metavar="[SCENE] PICTURE ...", help="Files or folders.")
+@click.option("--scene", "scenes", multiple=True, help="A scene file; several, for the pictures of each.")
+@click.option("--out", type=PATH, default=Path("out"), help="The folder for the pages and results.")
+@click.option("--pattern", help="Where pictures are in a folder, as in {student}/{scene}.jpg.")
+@depth_option
+@click.option("--jobs", type=click.IntRange(1), help="Pictures at a time; default: as many as there are cores.")
+@click.option("--timeout", type=click.FloatRange(min=1), default=300.0, help="Seconds that a picture may take.")
+@quiet_option
+@verbose_option
+def grade(
+    paths: Sequence[Path],
+    scenes: Sequence[str],
+    out: Path,
+    pattern: str | None,
+    depth: int,
+    jobs: int | None,
+    timeout: float,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Say whether pictures are right, and if not, what probably went wrong and what to do.
+
+    \b
+    crossray grade scenes/example1.txt scene.jpg
+    crossray grade --scene scenes/example1.txt --scene scenes/example2.txt submissions --out out/class
+    """
+    from reports.collection import collect
+    from reports.gradebook import Assignment
+    from reports.gradebook import grade as grade_all
+    from reports.gradelines import class_lines, picture_lines
+    from reports.terminal import progress_lines
+
+    named = list(scenes) or [str(paths[0])]
+    places = paths if scenes else paths[1:]
+    if not places:
+        raise InputError("expected SCENE PICTURE ..., or --scene SCENE and pictures or folders; found no picture")
+    loaded = [_load(path, quiet) for path in named]
+    names = _scene_names(named)
+    found = collect(names, places, pattern)
+    for path, reason in found.ignored if verbose else ():
+        _say(f"left out: {path}: {reason}", quiet)
+    assignment = Assignment(dict(zip(names, loaded, strict=True)), dict(zip(names, named, strict=True)), depth)
+    with progress_lines(quiet, verbose, {"grading": len(found.entries)}) as show:
+        results = grade_all(
+            assignment,
+            found,
+            out,
+            _version(),
+            jobs=jobs,
+            timeout=timeout,
+            progress=lambda text: show("grading", text, 1),
+        )
+    several = len(results["students"]) > 1
+    lines = class_lines(results) if several else (line for p in results["pictures"] for line in picture_lines(p))
+    _print("\n".join(map(plain, lines)))
+    _say(f"{out / 'grade.html'}", quiet)
+    statuses = {picture["status"] for picture in results["pictures"]}
+    wrong = any(picture["verdict"] == "wrong" for picture in results["pictures"])
+    code = NOT_DONE if "failed" in statuses else BAD_INPUT if "refused" in statuses else DISAGREES if wrong else DONE
+    raise click.exceptions.Exit(code)
+
+
+def _scene_names(paths: Sequence[str]) -> list[str]:
+    """The scenes' names: those of their files, which pictures are called by too."""
+    names = [Path(path).stem if path != "-" else "stdin" for path in paths]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(f"expected scene files of different names, found {twice} twice")
+    return names
+
+
+def assert_matches(scene: str | Path, picture: str | Path, **options: Any) -> None:
+    """Raise AssertionError unless `picture` is right for `scene`, naming the likely cause, what to do, and the report.
+
+    For tests in a repository of your own. Options: `depth` (3), `out`, a folder for the report (one of the picture's
+    name in `crossray-report`), and `timeout` (300 seconds). Raises SceneError for a scene that cannot be read and
+    FailureError where the picture could not be graded.
+    """
+    from reports.assertion import check_picture
+
+    __tracebackhide__ = True
+    check_picture(scene, picture, **options)
+
+
+@app.command()
 @scene_argument
 @click.argument("column", type=int, help="From the left, from 0.")
 @click.argument("row", type=int, help="From the top, from 0.")

@@ -26,12 +26,12 @@ def nearest(world: World, window: Window, ray: Ray, active: Mask) -> tuple[Numbe
     def meet_sphere(index: Number, row: list[Number], best: Number, hit: Number, listed: Number) -> State:
         t, counts = reach_sphere(world, window, ray, index, row)
         number = dr.gather(world.Index, world.listed, index) if world.tree else index
-        counts &= (t < best) | ((t == best) & (number < listed)) if world.tree else t < best
+        counts &= (t < best) | ((t == best) & (number < listed)) if world.tree else world.model.nearer(t, best)
         return dr.select(counts, t, best), dr.select(counts, index, hit), dr.select(counts, number, listed)
 
     def meet_plane(index: Number, row: list[Number], best: Number, hit: Number, listed: Number) -> State:
         t, counts = reach_plane(world, window, ray, index, row)
-        counts &= t < best
+        counts &= world.model.nearer(t, best)
         return dr.select(counts, t, best), dr.select(counts, index, hit), dr.select(counts, NOTHING, listed)
 
     miss = (world.Float(dr.inf), world.Index(NOTHING), world.Index(0))
@@ -52,7 +52,7 @@ def reach_plane(world: World, window: Window, ray: Ray, index: Number, row: list
     """Distance of a plane, and whether it counts."""
     left, normal = ray.leaving == index, world.Vector(*row[4:7])
     facing = dr.dot(ray.d, normal)
-    t = world.model.plane_distance(world.Vector(*row[:3]) - ray.origin, normal, facing, left)
+    t = world.model.plane_distance(world.model.plane_arm(world.Vector(*row[:3]), ray.origin), normal, facing, left)
     return t, window.plane(t, facing, left)
 
 
@@ -71,7 +71,7 @@ def blocked(world: World, ray: Ray, active: Mask) -> Mask:
     def meet_plane(index: Number, row: list[Number], dark: Mask) -> State:
         left, normal, q = ray.leaving == index, world.Vector(*row[4:7]), world.Vector(*row[:3]) - ray.origin
         facing = dr.dot(q, normal) - row[7]  # d.n, so that t = 1 exactly for a plane that holds the light
-        t = model.plane_distance(q, normal, facing, left)
+        t = model.plane_distance(model.plane_arm(world.Vector(*row[:3]), ray.origin), normal, facing, left)
         return (dark | window.plane(t, facing, left),)
 
     path = world.path(ray, lambda dark: world.Float(1))

@@ -12,7 +12,7 @@ from typing import Any
 
 import drjit as dr
 
-from reference.scene import SCREEN, SCREEN_DISTANCE, Scene, merge_coincident
+from reference.scene import LIGHT, SCREEN, SCREEN_DISTANCE, Scene, Triple, merge_coincident
 
 Number = Any
 Vector = Any
@@ -37,17 +37,22 @@ class Model:
 
     name: str
     summary: str
+    light: Triple
     surfaces: Callable[[Scene], Scene]
     camera_direction: Callable[[Number, Number, Number, Number], tuple[Number, Number, Number]]
     sphere_distances: Callable[[Vector, Vector, Number, Number, Mask], tuple[Number, Number]]
+    plane_arm: Callable[[Vector, Vector], Vector]
     plane_distance: Callable[[Vector, Vector, Number, Mask], Number]
+    nearer: Callable[[Number, Number], Mask]
     sphere_normal: Callable[[Vector, Vector, Number], Vector]
+    plane_normal: Callable[[Vector, Vector, Vector], Vector]
     camera: Window
     shadow: Window
     reflection: Window
     cosine: Callable[[Vector, Vector], Number]
     ambient: Callable[[Vector, Vector, Number], Vector]
     diffuse: Callable[[Vector, Number, Number], Vector]
+    local: Callable[[Vector, Vector, Mask, Number], Vector]
     reflected_origin: Callable[[Vector, Vector], Vector]
     reflected_direction: Callable[[Vector, Vector], Vector]
     reflected_weight: Callable[[Number, Number, Number], Number]
@@ -70,14 +75,29 @@ def sphere_distances(p: Vector, d: Vector, dd: Number, radius: Number, leaving: 
     return (-half - root) * scale, (root - half) * scale
 
 
+def plane_arm(point: Vector, origin: Vector) -> Vector:
+    """From the start of a ray to a point of a plane."""
+    return point - origin
+
+
 def plane_distance(q: Vector, normal: Vector, facing: Number, leaving: Mask) -> Number:
     """q.n / d.n, q = point of the plane - origin, facing = d.n; exactly 0 for a ray that starts on the plane."""
     return dr.select(leaving, 0, dr.dot(q, normal)) / facing
 
 
+def nearer(t: Number, best: Number) -> Mask:
+    """Whether a surface is met before the nearest so far; of equal ones the first listed stays."""
+    return t < best
+
+
 def sphere_normal(point: Vector, centre: Vector, radius: Number) -> Vector:
     """Outward, of unit length."""
     return (point - centre) * dr.rcp(radius)
+
+
+def plane_normal(point: Vector, place: Vector, normal: Vector) -> Vector:
+    """As it is given, of unit length, at any point; `place` is the plane's own point."""
+    return normal
 
 
 def cosine(normal: Vector, to_light: Vector) -> Number:
@@ -94,6 +114,11 @@ def ambient(surface: Vector, colour: Vector, coefficient: Number) -> Vector:
 def diffuse(surface: Vector, coefficient: Number, cosine: Number) -> Vector:
     """surface_colour * kd * cosine, for a point that the light reaches."""
     return surface * (coefficient * cosine)
+
+
+def local(ambient: Vector, diffuse: Vector, dark: Mask, depth: Number) -> Vector:
+    """The colour without reflections, of a point that the light does not reach where `dark`; `depth` counts bounces."""
+    return ambient + dr.select(dark, 0, diffuse)
 
 
 def reflected_direction(d: Vector, normal: Vector) -> Vector:
@@ -130,17 +155,22 @@ def before_light(least: float, grazing: float) -> Window:
 DOCUMENT = Model(
     name="document",
     summary="the assignment's text, literally",
+    light=LIGHT,
     surfaces=merge_coincident,
     camera_direction=pixel_direction,
     sphere_distances=sphere_distances,
+    plane_arm=plane_arm,
     plane_distance=plane_distance,
+    nearer=nearer,
     sphere_normal=sphere_normal,
+    plane_normal=plane_normal,
     camera=beyond(1, GRAZING),
     shadow=before_light(SHIFT, GRAZING),
     reflection=beyond(SHIFT, GRAZING),
     cosine=cosine,
     ambient=ambient,
     diffuse=diffuse,
+    local=local,
     reflected_origin=lambda point, normal: point,
     reflected_direction=reflected_direction,
     reflected_weight=reflected_weight,

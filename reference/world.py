@@ -63,7 +63,7 @@ class World(Rows):
         self.model, self.scene = model, scene
         lit = _lit(scene, spheres)
         self.light_on_sphere = bool(lit.any())
-        planes = [(*p.point, 0, *p.unit_normal, p.distance_from(LIGHT)) for p in scene.planes]
+        planes = [(*p.point, 0, *p.unit_normal, p.distance_from(model.light)) for p in scene.planes]
         rows = np.zeros((len(materials), 8))
         rows[: len(order), :6] = np.column_stack([spheres[order], lit[order], order])
         rows[len(order) :] = planes or 0
@@ -72,7 +72,7 @@ class World(Rows):
         self.materials = Rows(types, len(order), np.concatenate([materials[order], materials[len(order) :]]), MATERIAL)
         self.ambient = self.Vector(*map(self.uniform, scene.ambient))
         self.ambient_coefficient = self.uniform(scene.ambient_coefficient)
-        self.light = self.Vector(*LIGHT)
+        self.light = self.Vector(*map(self.uniform, model.light))
 
     def path(self, ray: Ray, reach: Callable[..., Number]) -> Path | None:
         """What a tree needs to know of rays; `reach` is the t beyond which nothing matters, a function of the state."""
@@ -138,15 +138,16 @@ def _radiance(world: World, direction: Vector, limit: Number) -> Vector:
         red, green, blue, diffuse, mirror, _, _, _ = world.materials.row(hit)
         point = dr.fma(direction, t, origin)
         sphere_normal = world.model.sphere_normal(point, world.Vector(x, y, z), radius)
-        normal = dr.select(hit < world.first_plane, sphere_normal, world.Vector(normal_x, normal_y, normal_z))
+        flat = world.model.plane_normal(point, world.Vector(x, y, z), world.Vector(normal_x, normal_y, normal_z))
+        normal = dr.select(hit < world.first_plane, sphere_normal, flat)
 
         surface = world.Vector(red, green, blue)
         to_light = world.light - point
         cosine = world.model.cosine(normal, to_light)
         shadow = Ray(point, to_light, dr.dot(to_light, to_light), hit)
         lit = (cosine != 0) & ~blocked(world, shadow, cosine != 0)
-        local = world.model.ambient(surface, world.ambient, world.ambient_coefficient)
-        local += dr.select(lit, world.model.diffuse(surface, diffuse, cosine), 0)
+        ambient = world.model.ambient(surface, world.ambient, world.ambient_coefficient)
+        local = world.model.local(ambient, world.model.diffuse(surface, diffuse, cosine), ~lit, depth)
         colour = dr.fma(local, weight, colour)
 
         depth += 1

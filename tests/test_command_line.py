@@ -20,7 +20,7 @@ from translator.contract import Limits
 from translator.registry import renderer_names
 from translator.renderers import mitsuba, povray
 
-COMMANDS = ("render", "export", "check", "compare", "explain", "certify", "doctor")
+COMMANDS = ("render", "export", "check", "compare", "grade", "explain", "certify", "doctor")
 SMALL = ("--size", "16x16")
 
 

@@ -1,0 +1,68 @@
+"""How far a picture as a whole is displaced against the reference, in pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.envelope import Envelope
+
+TILE = 32  # pixels: what is independent of what
+LEAST = 0.3  # pixels that count
+EXPLAINED = 0.15  # of the difference's variance at edges, at least
+DIFFERENT = 0.5  # of the variance that samples at the centres have: what has less is antialiased
+SURE = 6.0  # standard errors
+TILES = 12  # that must hold edges
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """Pixels to the right and down, at the centre; and how many more of each at the right and lower border."""
+
+    right: float
+    down: float
+    wider: float
+    taller: float
+    explained: float  # of the difference's variance at edges
+    significant: bool
+
+
+def displacement(envelope: Envelope, found: NDArray[np.float32]) -> Displacement:
+    """Least squares of the difference on the gradient of the mean over pixels, with errors from tile to tile.
+
+    A step that moves by a part of a pixel changes that part of the pixels along it, so that the gradient tells it
+    without bias; samples at random places in the pixel, or many, do not move it.
+    """
+    mean = envelope.mean.sum(axis=-1)
+    height, width = mean.shape
+    if min(height, width) < 3:
+        return Displacement(0, 0, 0, 0, 0, False)
+    difference = found.sum(axis=-1) - mean
+    vertical, horizontal = np.gradient(mean)
+    edges = (envelope.high - envelope.low).max(axis=-1) > 4
+    rows, columns = np.nonzero(edges)
+    if rows.size == 0:
+        return Displacement(0, 0, 0, 0, 0, False)
+    across, along = (columns + 0.5) / width * 2 - 1, (rows + 0.5) / height * 2 - 1
+    gx, gy = horizontal[rows, columns].astype(float), vertical[rows, columns].astype(float)
+    design = -np.column_stack([gx, gy, gx * across, gy * along])
+    target = difference[rows, columns].astype(float)
+    normal = design.T @ design
+    normal += 1e-9 * np.trace(normal) * np.eye(4) + 1e-12 * np.eye(4)
+    inverse = np.linalg.inv(normal)
+    fitted = inverse @ (design.T @ target)
+    left = target - design @ fitted
+    explained = 1 - float(left @ left) / max(float(target @ target), 1e-9)
+    scores = design * left[:, None]
+    tiles = rows // TILE * (width // TILE + 1) + columns // TILE
+    sums = np.column_stack([np.bincount(tiles, weights=scores[:, k]) for k in range(4)])
+    used = len(np.unique(tiles))
+    error = np.sqrt(np.diag(inverse @ (sums.T @ sums) @ inverse) * used / max(used - 1, 1))
+    usual = (envelope.centre.sum(axis=-1) - mean)[rows, columns].astype(float)
+    different = float(target @ target) > DIFFERENT * float(usual @ usual)
+    sure = (np.abs(fitted) > LEAST) & (np.abs(fitted) > SURE * error)
+    significant = bool(sure.any()) and different and used >= TILES and explained > EXPLAINED
+    right, down, wider, taller = map(float, fitted)
+    return Displacement(right, down, wider, taller, explained, significant)
