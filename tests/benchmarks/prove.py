@@ -1,6 +1,6 @@
 """Prove the gate: harmless pictures pass, mistakes are caught and named. Writes docs/power.md: `make prove`.
 
-    python tests/benchmarks/prove.py [--side 400] [--pairs 10] [--docs docs]
+    python tests/benchmarks/prove.py [SCENE ...] [--side 400] [--pairs 10] [--docs docs]
 
 Every known mistake is planted in every scene that shows it; the same pictures are judged by the rules that people use.
 """
@@ -201,7 +201,7 @@ def page(tallies: dict[str, Tally], names: list[str], side: int) -> str:
     rules = list(next(iter(tallies.values())).rules)
     lines = [
         "# How well wrong pictures are told from right ones\n",
-        f"Written by `make prove`: {len(names)} scenes (the examples and the diagnostic scenes) at {side} x {side}."
+        f"Written by `make prove`: {len(names)} scenes ({', '.join(names)}) at {side} x {side}."
         " Every mistake of the bank is planted in every scene in which it puts more than 0.05 % of the pixels off by"
         f" more than {VISIBLE} levels. The pictures are made by crossray's own tracer.\n",
         "| pictures | pass | " + " | ".join(rules) + " | cause first | in the first three |",
@@ -234,11 +234,12 @@ def page(tallies: dict[str, Tally], names: list[str], side: int) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="names; all by default")
     parser.add_argument("--side", type=int, default=250, help="pixels")
     parser.add_argument("--pairs", type=int, default=6, help="pairs of mistakes a scene")
     parser.add_argument("--docs", type=Path, default=ROOT / "docs")
     options = parser.parse_args()
-    names = list(scenes())
+    names = options.scenes or list(scenes())
     tallies = prove(names, options.side, options.pairs, lambda text: print(text, file=sys.stderr, flush=True))
     text = page(tallies, names, options.side)
     (options.docs / "power.md").write_text(text, encoding="utf-8")
