@@ -34,6 +34,7 @@ ROUGH = 2  # blocks beside each other, where that will do
 QUIET = 1.0  # levels that a block may be off without a reason
 MOST = 48.0  # levels: a block that is farther off counts no more
 NAMED = 0.7  # the least share of a cause that is named, not guessed
+RIVAL = 3.0  # times as much as the best leaves unexplained, what another that is named may leave
 GUESS = 0.25  # the least share of a cause that is listed
 LEFT = 0.004  # of the difference: what is left unexplained that tells nothing
 PAIR_COST, FIT_COST = 1.7, 1.3  # how many times as much a second mistake, or a number, must explain of what is left
@@ -42,6 +43,7 @@ AUDIBLE = 1.1  # times the noise of its file: what a difference must be at least
 SURE = 0.985  # the share of a JPEG's difference from which on nothing else is looked for
 LISTED = 5
 PAIRED = 8  # pairs that are drawn
+NEARBY = (0.8, 0.9, 0.95, 0.975, 1.025, 1.05, 1.1, 1.2)  # times the right number, that are tried
 PROMISING = 0.97  # of the difference may be left by a family's best number for it to be looked into
 SPECKS = 0.9  # of the pixels that are off must be just as the mistake has them, where it comes and goes
 
@@ -193,8 +195,9 @@ def diagnose(suspects: Suspects, levels: NDArray[Any], facts: Facts) -> list[Cau
             found += [(share(one), one) for one in further(suspects, picture, found)]
     found.sort(key=lambda pair: pair[1].rank(pair[0]))
     causes: list[Cause] = []
+    best = max((part for part, _ in found), default=0.0)
     for part, hypothesis in found:
-        cause = _cause(part, hypothesis)
+        cause = _cause(part, hypothesis, part >= NAMED and 1 - part <= RIVAL * max(1 - best, LEFT))
         if part >= GUESS and cause.id not in [known.id for known in causes]:
             causes.append(cause)
     return causes[:LISTED]
@@ -207,7 +210,7 @@ def _is_settled(picture: Levels, enough: float, best: tuple[float, Hypothesis] |
     return best[0] > enough or float(np.mean(off(np.abs(picture - best[1].blocks)) > PLAIN)) < FEW
 
 
-def _cause(share: float, hypothesis: Hypothesis) -> Cause:
+def _cause(share: float, hypothesis: Hypothesis, named: bool) -> Cause:
     ids = [id_.partition("/")[0] for id_ in hypothesis.ids]
     mistakes = hypothesis.mistakes
     return Cause(
@@ -217,7 +220,7 @@ def _cause(share: float, hypothesis: Hypothesis) -> Cause:
         looks="; ".join(mistake.looks for mistake in mistakes),
         hint=" ".join(mistake.hint for mistake in mistakes),
         features=tuple(dict.fromkeys(mistake.feature for mistake in mistakes)),
-        named=share >= NAMED,
+        named=named,
         parts=tuple((id_, mistake.title) for id_, mistake in zip(ids, mistakes, strict=True)),
         value=hypothesis.value,
     )
@@ -261,7 +264,9 @@ def _best_value(suspects: Suspects, picture: Levels, id_: str, family: Family) -
 
     low, high = family.bounds
     grid = np.geomspace(low, high, 7) if low > 0 else np.linspace(low, high, 7)
-    best = min(map(float, grid), key=error)
+    right = family.right(suspects.scene)
+    starts = [*map(float, grid), *(right * share for share in NEARBY if low <= right * share <= high)]
+    best = min(starts, key=error)
     if error(best) > PROMISING * distance(rough, suspects.roughly(suspects.right)):
         return
     step = grid[1] / grid[0] if low > 0 else grid[1] - grid[0]
@@ -310,7 +315,7 @@ def _light(suspects: Suspects, picture: Levels) -> Hypothesis:
         step = step / 2 if better == best else step
         best = better
     made = suspects.draw(light_at(best))
-    return Hypothesis(("LP",), (light_at(best),), suspects.right if made is None else made, 0.0)
+    return Hypothesis(("LP",), (light_at(best),), suspects.right if made is None else made)
 
 
 def _pairs(suspects: Suspects, picture: Levels, found: list[tuple[float, Hypothesis]]) -> Iterator[Hypothesis]:

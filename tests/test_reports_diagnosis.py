@@ -10,6 +10,7 @@ from helpers import ROOT
 
 sys.path.insert(0, str(ROOT / "tests" / "benchmarks"))
 
+from planted import plant
 from prove import jpeg, page, png, prove
 
 from reference.image import quantise
@@ -47,12 +48,25 @@ def test_other_sizes_and_antialiasing() -> None:
         assert causes(levels)[0].id == "R8"
 
 
-@pytest.mark.parametrize(("id_", "value"), [("C7", 70.0), ("A4", 0.2), ("Q4", 1.8)])
+@pytest.mark.parametrize(
+    ("id_", "value"), [("C7", 70.0), ("C7", 55.0), ("A4", 0.2), ("A4", 0.12), ("A4", 0.08), ("Q4", 1.8)]
+)
 def test_numbers_are_found(id_: str, value: float) -> None:
     found = causes(FAMILIES[id_].of(value).draw(suspects().scene, View(SIDE, SIDE, 3)))[0]
     assert found.id == id_
     assert found.value == pytest.approx(value, rel=0.03)
     assert "not" in found.title
+
+
+@pytest.mark.parametrize(
+    "key", ["C1", "C7", "I1", "I3", "P1", "P3", "S3", "S6", "S8", "L6", "L10", "A2", "R1", "R8", "R9"]
+)
+def test_what_another_tracer_draws(key: str) -> None:
+    """Pictures of a plain NumPy tracer that makes the mistake."""
+    text = (ROOT / "scenes" / "example1.txt").read_text(encoding="utf-8-sig")
+    first = causes(np.nan_to_num(plant(text, SIDE, key)))[0]
+    assert first.id == key
+    assert first.named
 
 
 def test_the_light_is_found() -> None:
