@@ -7,6 +7,7 @@ height x width x 3 in levels, not clamped, and none is below 0.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -65,16 +66,29 @@ def compare_terms(
 ) -> dict[str, dict[str, Any]]:
     """What is known of a renderer's SEPARABLE terms, from its picture and those of the variants.
 
-    The largest error in levels, and how many pixels are `over` half a level, knife edges too.
+    The largest error in levels, and how many pixels are `over` half a level, knife edges too. Pictures are clamped
+    before reflection is what is left of them, as some renderers write nothing above 255.
     """
     found = {name: picture for name, picture in pictures.items() if picture is not None}
+    errors = {name: error_map(right[name], found[name]) for name in VARIED if name in found}
     if full is not None and len(found) == len(pictures):
-        found["reflection"] = full - found["ambient"] - found["light"]
-    errors = {name: error_map(right[name], found[name]) for name in SEPARABLE if name in found}
+        whole = right["ambient"] + right["light"] + right["reflection"]
+        errors["reflection"] = _error(_left(whole, right), _left(full, found))
     return {
         name: {"max_error": round(float(error.max()), 4), "over": int(np.count_nonzero(error > TOLERANCE))}
         for name, error in errors.items()
     }
+
+
+def _left(full: NDArray[Any], terms: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
+    """What ambient and light leave of a picture, all of them clamped."""
+    clamped = [np.clip(levels, 0, 255).astype(np.float64) for levels in (full, *(terms[name] for name in VARIED))]
+    return np.asarray(clamped[0] - clamped[1] - clamped[2])
+
+
+def _error(right: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The largest channel's error of each pixel, in levels; not a number counts as 255."""
+    return np.asarray(np.nan_to_num(np.abs(right - other).max(axis=-1), nan=255.0))
 
 
 def record_terms(run: Recording, entry: dict[str, Any], scene: Scene) -> Terms | None:

@@ -71,6 +71,21 @@ def test_the_term_that_is_wrong_is_named(wrong: str) -> None:
     assert found[wrong] == {"max_error": 7, "over": 1}
 
 
+def test_what_a_renderer_clamps_is_no_error() -> None:
+    right = dict(of("example1"))
+    right["reflection"] = right["reflection"].copy()
+    right["reflection"][20, 30] = 300  # the whole is above 255
+    full = np.clip(right["ambient"] + right["light"] + right["reflection"], 0, 255)
+    alone = {name: np.clip(right[name], 0, 255) for name in ("ambient", "light")}
+    assert {name: numbers["over"] for name, numbers in compare_terms(right, full, dict(alone)).items()} == {
+        "ambient": 0,
+        "light": 0,
+        "reflection": 0,
+    }
+    full[20, 30] = np.nan
+    assert compare_terms(right, full, dict(alone))["reflection"] == {"max_error": 255, "over": 1}
+
+
 def test_what_was_not_drawn_is_not_compared() -> None:
     right = of("example1")
     assert set(compare_terms(right, None, {"ambient": right["ambient"], "light": None})) == {"ambient"}
