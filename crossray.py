@@ -270,6 +270,7 @@ def check(
     from reports.terms import VARIED, record_comparisons, record_terms, variants
     from reports.writing import write_reports
     from translator.concurrency import Job, run_jobs
+    from translator.process import run_process
     from translator.registry import TRUTH, check_names, renderer_names
 
     required = _split(renderers)
@@ -295,7 +296,7 @@ def check(
             show(job.renderer, what, 1 if outcome else 0)
 
         with closing(run_jobs(jobs, report)) as outcomes:
-            for (path, text), (_, scene), accepted, before in zip(texts, loaded, approved, earlier, strict=True):
+            for (path, text), accepted, before in zip(texts, approved, earlier, strict=True):
                 facts = {"depth": depth, "convention": "exact", "text": text, "approvals": accepted}
                 entry = run.add_scene(path, size.width, size.height, **facts)
                 full = {}
@@ -304,7 +305,7 @@ def check(
                     run.add_picture(entry, {k: v for k, v in vars(outcome).items() if k != "picture"}, outcome.picture)
                 if before:
                     run.add_picture(entry, *before)
-                terms = record_terms(run, entry, scene)
+                terms = record_terms(run, entry, lambda words, place: run_process(words, place, {}, timeout))
                 if by_term:
                     alone = [{job.renderer: job for job in islice(outcomes, len(names))} for _ in VARIED]
                     for name in names:

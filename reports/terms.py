@@ -7,14 +7,18 @@ height x width x 3 in levels, not clamped, and none is below 0.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+import warnings
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.errors import DeviceError
+from reference.errors import RendererError
 from reference.model import EXACT, Window
 from reference.scene import Scene
 from reference.tracer import render
@@ -91,15 +95,23 @@ def _error(right: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np
     return np.asarray(np.nan_to_num(np.abs(right - other).max(axis=-1), nan=255.0))
 
 
-def record_terms(run: Recording, entry: dict[str, Any], scene: Scene) -> Terms | None:
-    """Draw and record the terms of a scene that `run` has begun; None where that is too much or does not work."""
-    shape = {key: entry[key] for key in ("width", "height", "depth")}
-    if shape["width"] * shape["height"] > LARGEST:
+def record_terms(run: Recording, entry: dict[str, Any], draw: Callable[[list[str], Path], object]) -> Terms | None:
+    """Record the terms of a scene that `run` has begun; None where that is too much or does not work.
+
+    They are drawn in a process of their own, as all pictures are: `draw` runs a command in a folder.
+    """
+    if entry["width"] * entry["height"] > LARGEST:
         return None
-    try:
-        found = terms(scene, **shape)
-    except DeviceError:
-        return None
+    shape = [str(entry[key]) for key in ("width", "height", "depth")]
+    with TemporaryDirectory(prefix="crossray-") as name:
+        folder = Path(name)
+        (folder / "scene.txt").write_text(entry["text"], encoding="utf-8")
+        try:
+            draw([sys.executable, "-m", "reports.terms", "scene.txt", "terms.npz", *shape], folder)
+        except RendererError:
+            return None
+        with np.load(folder / "terms.npz") as stored:
+            found = {term: stored[term] for term in TITLES}
     run.add_terms(entry, {name: (TITLES[name], found[name]) for name in TITLES})
     return found
 
@@ -117,6 +129,14 @@ def record_comparisons(
         return
     for term, numbers in compare_terms(right, full, pictures).items():
         run.add_term_comparison(entry, term, {"renderer": renderer[0], "title": renderer[1], **numbers})
+
+
+def main() -> None:
+    """Draw the terms of a scene file: `python -m reports.terms SCENE PICTURES.npz WIDTH HEIGHT DEPTH`."""
+    scene, pictures, *shape = sys.argv[1:]
+    width, height, depth = map(int, shape)
+    warnings.simplefilter("ignore")
+    np.savez(pictures, **terms(Scene.load(scene), width=width, height=height, depth=depth))  # type: ignore[arg-type]
 
 
 def without_diffuse(scene: Scene) -> Scene:
@@ -142,3 +162,7 @@ def without_reflection(scene: Scene) -> Scene:
 def without_ambient(scene: Scene) -> Scene:
     """The scene with ka = 0."""
     return replace(scene, ambient_coefficient=0.0)
+
+
+if __name__ == "__main__":
+    main()

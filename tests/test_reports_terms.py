@@ -10,7 +10,8 @@ import pytest
 from helpers import EXAMPLE, TRICKY, exact, need, rendered
 
 from reference import Scene
-from reference.text import parse
+from reference.errors import RendererError
+from reference.text import dump, parse
 from reports.recording import Recording
 from reports.terms import LARGEST, TITLES, Terms, compare_terms, record_terms, terms, variants
 from translator.contract import Settings
@@ -108,5 +109,15 @@ def test_a_renderer_draws_the_variants() -> None:
 def test_terms_of_very_large_pictures_are_left_out(tmp_path: Path) -> None:
     run = Recording(tmp_path, "0.1.0")
     entry = run.add_scene("s.txt", LARGEST, 2, depth=3, convention="exact", text="")
-    assert record_terms(run, entry, scenes()["example1"]) is None
+    assert record_terms(run, entry, lambda words, folder: pytest.fail("drawn")) is None
+    assert "terms" not in entry
+
+
+def test_terms_that_cannot_be_drawn_are_left_out(tmp_path: Path) -> None:
+    def crash(words: list[str], folder: Path) -> None:
+        raise RendererError("python ended with signal 6")
+
+    run = Recording(tmp_path, "0.1.0")
+    entry = run.add_scene("s.txt", 8, 8, depth=3, convention="exact", text=dump(scenes()["example1"]))
+    assert record_terms(run, entry, crash) is None
     assert "terms" not in entry

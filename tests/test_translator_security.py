@@ -99,8 +99,17 @@ def plain_environment() -> dict[str, str]:
 def hostile_environment(world: Path) -> dict[str, str]:
     """A home, a working directory and variables full of traps. `crossray` itself still starts."""
     outside, home, work = (world / name for name in ("outside", "home", "work"))
-    for folder in (outside, home / ".povray/3.7", work, world / "tmp", world / "python", world / "relative"):
+    for folder in (
+        outside,
+        home / ".povray/3.7",
+        home / ".drjit",
+        work,
+        world / "tmp",
+        world / "python",
+        world / "relative",
+    ):
         folder.mkdir(parents=True)
+    (home / ".drjit/sweep.stamp").touch()  # Dr.Jit notes there, once a day or so, that it has looked after its kernels
     trap = POVRAY_TRAP.format(outside=outside)
     permitted = f"[File I/O Security]\nnone\n[Shellout Security]\nallowed\n[Permitted Paths]\nread+write* = {outside}\n"
     for place in (work / "povray.ini", home / ".povray/3.7/povray.ini", home / ".povrayrc", outside / "povray.ini"):
