@@ -27,6 +27,7 @@ from reference.tables import State, upload
 Number = Any  # a Dr.Jit array
 
 LEAF = 3  # spheres in a leaf, at most
+SINGLE = 1 << 16  # spheres up to which each has a leaf of its own; beyond, building takes longer than that saves
 BITS, STEPS = 10, 1 << 10  # of the grid
 COARSE = 2  # how many times larger the faces of leaves may be on the grid, on average
 SAMPLE = 64  # spheres that tell a node's longest side
@@ -167,7 +168,8 @@ def sort(centres: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.boo
     All leaves have as many, so some spheres, evenly chosen, are there twice and count once.
     """
     count, levels = len(centres), 0
-    while count > LEAF << levels:
+    most = 1 if count <= SINGLE else LEAF
+    while count > most << levels:
         levels += 1
     leaves = 1 << levels
     size = -(-count // leaves)
