@@ -25,6 +25,7 @@ from reports.location import locate
 from reports.rays import pixel_sentence, ray_rows
 from reports.raytree import ray_tree
 from reports.recording import slug
+from reports.resemblance import unlike
 from reports.submission import Facts, Submission, read_submission
 from reports.verdict import OUTSIDE, Blob, Verdict, judge
 
@@ -101,7 +102,7 @@ def _wrong(
     """What a wrong picture's record says beyond any."""
     outside = int((worst_channel(excess) > 0).sum())
     where = _where(bounds, excess)
-    advice = _what_else(task, submission.levels)
+    advice = _what_else(task, submission.levels) or unlike(bounds, submission) or ""
     found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels, submission.facts)
     causes = [_cause(cause, where) for cause in _telling(found)]
     features: list[str] = next((cause["features"] for cause in causes if cause["named"]), [])
