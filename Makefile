@@ -40,6 +40,7 @@ pictures: report browser  ## Draw the pictures of the README
 
 docs: $(READY) renderers  ## Write the generated pages of docs/ (minutes)
 	$(BIN)/python docs/scenes.py
+	$(BIN)/python docs/mistakes.py
 	$(BIN)/python docs/renderers.py
 
 lock: $(READY)  ## Pin the newest versions of all dependencies, with hashes

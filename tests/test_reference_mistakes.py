@@ -1,6 +1,7 @@
 """The bank of mistakes: each shows where it is said to, as much as people measured, and does what its title says."""
 
 import re
+import runpy
 import warnings
 from dataclasses import replace
 from functools import cache
@@ -111,6 +112,12 @@ def test_texts_are_there() -> None:
         assert mistake.looks
     titles = [mistake.title for key, mistake in MISTAKES.items() if key not in ("S9/2", "S10/2", "R4/2")]
     assert len(set(titles)) == len(titles)
+
+
+def test_the_catalogue_is_up_to_date() -> None:
+    page = runpy.run_path(str(ROOT / "docs" / "mistakes.py"))["page"]()
+    assert (ROOT / "docs" / "mistakes.md").read_text(encoding="utf-8") == page, "`make docs` writes it"
+    assert all(f"| {key.partition('/')[0]} |" in page for key in MISTAKES)
 
 
 def test_depth_is_that_of_the_transcription() -> None:
