@@ -17,7 +17,7 @@ from reference.explanation import explain
 from reference.model import DOCUMENT
 from reference.scene import Scene
 from reference.world import View
-from reports.diagnosis import Cause, Suspects, diagnose
+from reports.diagnosis import Cause, diagnose
 from reports.envelope import Envelope, envelope
 from reports.gradebook import Task, empty_record
 from reports.gradeimages import SMALL, THUMB, Album, surroundings, worst_channel
@@ -27,6 +27,7 @@ from reports.raytree import ray_tree
 from reports.recording import slug
 from reports.resemblance import unlike
 from reports.submission import Facts, Submission, read_submission
+from reports.suspects import Suspects
 from reports.verdict import OUTSIDE, Blob, Verdict, judge
 
 SHARED = "pictures/_right"  # which is no student's

@@ -52,6 +52,8 @@ def colour(sc: Any, o: Any, d: Any, depth: int, mx: int, made: set[str], bg: Any
     if depth > mx:
         return np.full((len(o), 3), 128.0)
     near = (1e-4 if "C9" in made else 1.0) if depth == 0 else (1.0 if "R5" in made else 1e-4)
+    if "R4" in made and depth:
+        near = 0.0
     best, wh = np.full(len(o), np.inf), np.full(len(o), -1)
     for i, s in enumerate(sc.surfaces):
         cand = np.full(len(o), np.inf)  # first root that counts
@@ -104,6 +106,8 @@ def colour(sc: Any, o: Any, d: Any, depth: int, mx: int, made: set[str], bg: Any
     lo, hi = 1e-4, 1.0
     if "S5" in made:
         lo = 0.05
+    if "S1" in made:
+        lo = 0.0
     if "S3" in made:
         hi = np.inf
     for i, s in enumerate(sc.surfaces):

@@ -17,7 +17,8 @@ from reference.image import quantise
 from reference.mistakes import FAMILIES, MISTAKES, combine, light_at
 from reference.scene import Scene
 from reference.world import View
-from reports.diagnosis import NAMED, Cause, Suspects, blocks, diagnose, resized
+from reports.diagnosis import NAMED, Cause, diagnose
+from reports.suspects import Suspects, blocks, resized
 
 SIDE = 200
 
@@ -102,12 +103,13 @@ def test_what_nobody_knows_has_no_name() -> None:
 
 
 def test_the_gate_is_proven_on_a_part() -> None:
-    tallies = prove(["example3"], 120, 2)
+    tallies = prove(["example3"], 120, 2, sides=(160,))
     harmless, mistakes = tallies["harmless"], tallies["mistakes"]
     assert harmless.passed == harmless.pictures > 40
+    assert tallies["sizes"].passed == tallies["sizes"].pictures > 10
     assert mistakes.pictures > 40
     assert mistakes.passed == 0
     assert mistakes.first >= 0.9 * mistakes.pictures
     assert mistakes.three >= 0.95 * mistakes.pictures
-    text = page(tallies, ["example3"], 120)
+    text = page(tallies, ["example3"], 120, (160,))
     assert f"{harmless.passed} of {harmless.pictures} (100.0 %)" in text

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from fakes import are_gone
 from helpers import EXAMPLE, ROOT, crossray
+from jsonschema import Draft202012Validator
 from matplotlib import cbook
 from PIL import Image
 
@@ -41,8 +42,16 @@ def drawn(path: Path, mistake: str = "") -> Image.Image:
     return Image.fromarray(quantise(np.asarray(render(scene, DOCUMENT, width=SIDE, height=SIDE))))
 
 
+def schema() -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((ROOT / "reports/assets/grade.schema.json").read_text(encoding="utf-8"))
+    Draft202012Validator.check_schema(content)
+    return content
+
+
 def graded(folder: Path) -> dict[str, Any]:
+    """What grade.json holds, which follows its schema."""
     content: dict[str, Any] = json.loads((folder / "grade.json").read_text(encoding="utf-8"))
+    assert [error.message for error in Draft202012Validator(schema()).iter_errors(content)] == []
     return content
 
 
@@ -143,6 +152,18 @@ def test_one_right_picture(tmp_path: Path) -> None:
         "pictures",
     }
     assert json.loads((tmp_path / "out" / "results.json").read_text())["score"] == 100
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("verdict", "maybe"), ("status", "fine"), ("outside", -1), ("causes", [{"id": "S8"}]), ("features", ["magic"])],
+)
+def test_the_schema_refuses_what_is_wrong(tmp_path: Path, key: str, value: Any) -> None:
+    drawn(EXAMPLE).save(tmp_path / "scene.png")
+    assert crossray("grade", EXAMPLE, "scene.png", "--out", "out", cwd=tmp_path).returncode == 0
+    content = graded(tmp_path / "out")
+    content["pictures"][0][key] = value
+    assert not Draft202012Validator(schema()).is_valid(content)
 
 
 def test_one_wrong_picture(tmp_path: Path) -> None:

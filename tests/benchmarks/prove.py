@@ -23,22 +23,33 @@ from PIL import Image
 
 from reference import Scene
 from reference.image import quantise
-from reference.mistakes import MISTAKES, combine
+from reference.mistakes import MISTAKES, Mistake, combine
 from reference.model import DOCUMENT
 from reference.slips import draw
 from reference.world import View
-from reports.diagnosis import Suspects, diagnose
+from reports.diagnosis import diagnose
 from reports.envelope import envelope
 from reports.submission import Facts, Submission
+from reports.suspects import Suspects
 from reports.verdict import judge
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHOWN = 5e-4  # of the pixels that must be off by more than 8 levels for a mistake to be asked for
 VISIBLE = 8  # levels
+SPECKLED = 0.25  # of the pixels that a mistake which comes and goes may spoil are spoilt
 PNG = Facts("PNG", 8, "RGB")
 DEEP = Facts("PNG", 16, "RGB")
 QUALITIES = (60, 75, 85, 95)
 SUBSAMPLINGS = {"4:4:4": 0, "4:2:0": 2}
+SIDES = (500, 2000)  # pixels, of harmless pictures of other sizes
+TITLES = {
+    "harmless": "harmless: should pass",
+    "sizes": "harmless, of other sizes: should pass",
+    "mistakes": "one mistake, PNG: should not",
+    "as JPEG": "one mistake, JPEG 85 4:2:0: should not",
+    "rounding": "at most one level off: should, as rounding",
+    "pairs": "two mistakes: should not; both named",
+}
 Pixels = NDArray[np.uint8]
 
 
@@ -77,8 +88,8 @@ def jpeg(pixels: Pixels, quality: int, subsampling: str) -> Submission:
     return Submission(np.asarray(image.convert("RGB"), np.float32), facts)
 
 
-def harmless(scene: Scene, view: View) -> Iterator[tuple[str, Submission]]:
-    """Right pictures as other programs make them."""
+def harmless(scene: Scene, view: View, *, few: bool = False) -> Iterator[tuple[str, Submission]]:
+    """Right pictures as other programs make them; or a `few` of them."""
     side = view.width
     samples = np.clip(draw(scene, DOCUMENT, View(4 * side, 4 * view.height, view.depth)), 0, 255)
     samples = samples.reshape(view.height, 4, side, 4, 3)
@@ -97,8 +108,8 @@ def harmless(scene: Scene, view: View) -> Iterator[tuple[str, Submission]]:
     }
     for kind, levels in kinds.items():
         yield kind, png(quantise(levels))
-        for quality in QUALITIES:
-            for subsampling in SUBSAMPLINGS:
+        for quality in QUALITIES[:1] if few else QUALITIES:
+            for subsampling in ("4:2:0",) if few else SUBSAMPLINGS:
                 yield f"{kind}, JPEG {quality} {subsampling}", jpeg(quantise(levels), quality, subsampling)
     yield "16 bit", Submission((np.floor(centre * 257) / 257).astype(np.float32), DEEP)
 
@@ -118,9 +129,26 @@ def other_rules(right: Pixels, found: NDArray[Any]) -> dict[str, bool]:
     return {"SSIM >= .99": ssim >= 0.99, "FLIP <= .02": flip <= 0.02, "idiff": bool(idiff)}
 
 
-def prove(names: list[str], side: int, pairs: int, say: Callable[[str], None] = lambda text: None) -> dict[str, Tally]:
+def other_sizes(scene: Scene, depth: int, side: int, tally: Tally, name: str) -> None:
+    """Judge right pictures of one scene at another size."""
+    bounds = envelope(scene, side, side, depth)
+    for kind, picture in harmless(scene, View(side, side, depth), few=True):
+        tally.pictures += 1
+        if judge(bounds, picture).right:
+            tally.passed += 1
+        else:
+            tally.failed.append(f"{name}: {side} x {side}, {kind}")
+
+
+def prove(
+    names: list[str],
+    side: int,
+    pairs: int,
+    say: Callable[[str], None] = lambda text: None,
+    sides: tuple[int, ...] = SIDES,
+) -> dict[str, Tally]:
     """The tally of harmless pictures, of mistakes, of those of rounding, and of pairs, over some scenes."""
-    tallies = {kind: Tally() for kind in ("harmless", "mistakes", "as JPEG", "rounding", "pairs")}
+    tallies = {kind: Tally() for kind in TITLES}
     known = scenes()
     for name in names:
         say(name)
@@ -139,9 +167,11 @@ def prove(names: list[str], side: int, pairs: int, say: Callable[[str], None] = 
         for kind, picture in harmless(scene, view):
             if not passes(tallies["harmless"], picture):
                 tallies["harmless"].failed.append(f"{name}: {kind}")
+        for other in sides:
+            other_sizes(scene, view.depth, other, tallies["sizes"], name)
         seen = []
         for key, mistake in MISTAKES.items():
-            pixels = quantise(mistake.draw(scene, view))
+            pixels = quantise(planted(scene, view, mistake))
             off = np.abs(pixels.astype(int) - right).max(axis=-1)
             if mistake.rounding and off.max() == 1:
                 passes(tallies["rounding"], png(pixels))
@@ -160,6 +190,15 @@ def prove(names: list[str], side: int, pairs: int, say: Callable[[str], None] = 
             else:
                 _count(tallies["pairs"], name, [one, other], suspects, picture)
     return tallies
+
+
+def planted(scene: Scene, view: View, mistake: Mistake) -> NDArray[Any]:
+    """The picture of a mistake; one that comes and goes spoils a pixel in four."""
+    made = mistake.draw(scene, view)
+    if not mistake.speckled:
+        return made
+    by_chance = np.random.default_rng(11).random((view.height, view.width, 1)) < SPECKLED
+    return np.where(by_chance, made, draw(scene, DOCUMENT, view))
 
 
 def planted_pairs(
@@ -192,7 +231,7 @@ def _count(tally: Tally, name: str, keys: list[str], suspects: Suspects, picture
         tally.failed.append(f"{name}: {' and '.join(keys)}: {', '.join(cause.id for cause in causes[:3]) or 'nothing'}")
 
 
-def page(tallies: dict[str, Tally], names: list[str], side: int) -> str:
+def page(tallies: dict[str, Tally], names: list[str], side: int, sides: tuple[int, ...] = SIDES) -> str:
     """docs/power.md."""
 
     def share(part: int, whole: int) -> str:
@@ -203,26 +242,20 @@ def page(tallies: dict[str, Tally], names: list[str], side: int) -> str:
         "# How well wrong pictures are told from right ones\n",
         f"Written by `make prove`: {len(names)} scenes ({', '.join(names)}) at {side} x {side}."
         " Every mistake of the bank is planted in every scene in which it puts more than 0.05 % of the pixels off by"
-        f" more than {VISIBLE} levels. The pictures are made by crossray's own tracer.\n",
+        f" more than {VISIBLE} levels. The pictures are made by crossray's own tracer. Other sizes are"
+        f" {' and '.join(map(str, sides))} pixels a side.\n",
         "| pictures | pass | " + " | ".join(rules) + " | cause first | in the first three |",
         "|---|---|" + "---|" * (len(rules) + 2),
     ]
-    titles = {
-        "harmless": "harmless: should pass",
-        "mistakes": "one mistake, PNG: should not",
-        "as JPEG": "one mistake, JPEG 85 4:2:0: should not",
-        "rounding": "at most one level off: should, as rounding",
-        "pairs": "two mistakes: should not; both named",
-    }
     for kind, tally in tallies.items():
         named = kind in ("mistakes", "as JPEG", "pairs")
-        cells = [titles[kind], share(tally.passed, tally.pictures)]
-        cells += [share(tally.rules.get(rule, 0), tally.pictures) for rule in rules]
+        cells = [TITLES[kind], share(tally.passed, tally.pictures)]
+        cells += [share(tally.rules[rule], tally.pictures) if tally.rules else "" for rule in rules]
         cells += [share(part, tally.pictures) if named else "" for part in (tally.first, tally.three)]
         lines.append(f"| {' | '.join(cells)} |")
     for kind, tally in tallies.items():
         if tally.failed:
-            lines += ["", f"## Not as it should be: {titles[kind].partition(':')[0]}", ""]
+            lines += ["", f"## Not as it should be: {TITLES[kind].partition(': should')[0]}", ""]
             lines += [f"- {text}" for text in tally.failed]
     lines += [
         "",
