@@ -15,6 +15,7 @@ may meet is passed over.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -50,7 +51,7 @@ class Tree:
         self.ends = upload(types.Index, np.append(0, np.cumsum(counts.sum(axis=1))).astype(np.uint32))
         inside, reach = centres[leaves], radii[leaves, None]
         low, high = inside - reach, inside + reach
-        low, high = (low.min(axis=1), high.max(axis=1)) if len(centres) else (np.zeros((1, 3)), np.zeros((1, 3)))
+        low, high = (least(low, 1), most(high, 1)) if len(centres) else (np.zeros((1, 3)), np.zeros((1, 3)))
         first, last = low.min(axis=0), high.max(axis=0)
         step = np.maximum(last - first, SMALLEST) / (STEPS - 2)
         on_grid = np.floor((low - first) / step), np.ceil((high - first) / step)
@@ -168,8 +169,8 @@ def sort(centres: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.boo
     All leaves have as many, so some spheres, evenly chosen, are there twice and count once.
     """
     count, levels = len(centres), 0
-    most = 1 if count <= SINGLE else LEAF
-    while count > most << levels:
+    full = 1 if count <= SINGLE else LEAF
+    while count > full << levels:
         levels += 1
     leaves = 1 << levels
     size = -(-count // leaves)
@@ -180,7 +181,7 @@ def sort(centres: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.boo
     for level in range(levels):
         nodes = points.reshape(3, 1 << level, -1)
         some = nodes[:, :, :: max(1, nodes.shape[2] // SAMPLE)]
-        longest = (some.max(axis=2) - some.min(axis=2)).argmax(axis=0)
+        longest = (most(some, 2) - least(some, 2)).argmax(axis=0)
         # Not negative, coordinates are in the order of their bits; the place is carried along below them.
         keys = nodes[longest, np.arange(1 << level)].view(np.uint32).astype(np.uint64) << np.uint64(32)
         keys |= np.arange(leaves * size, dtype=np.uint64).reshape(keys.shape)
@@ -192,15 +193,15 @@ def sort(centres: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.boo
 
 def faces(sides: NDArray[np.float64]) -> NDArray[np.float64]:
     """Half the area of the faces of each box, given their sides (n x 3)."""
-    area: NDArray[np.float64] = (sides * np.roll(sides, 1, axis=1)).sum(axis=1)
+    x, y, z = sides.T
+    area: NDArray[np.float64] = x * y + y * z + z * x
     return area
 
 
 def packed(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint32]:
     """The boxes of all nodes' children, given each leaf's in steps of the grid: a row of 4 words."""
-    shifts = np.arange(3, dtype=np.uint32) * np.uint32(BITS)
-    corners = boxes(low.astype(np.uint32), high.astype(np.uint32))
-    words: NDArray[np.uint32] = np.bitwise_or.reduce(corners << shifts, axis=-1)
+    x, y, z = np.moveaxis(boxes(low.astype(np.uint32), high.astype(np.uint32)), -1, 0)
+    words: NDArray[np.uint32] = x | y << np.uint32(BITS) | z << np.uint32(2 * BITS)
     return words.reshape(len(low), 4)
 
 
@@ -218,5 +219,15 @@ def boxes(low: NDArray[Any], high: NDArray[Any]) -> NDArray[Any]:
     while (row := len(low) // 2) > 0:
         low, high = low.reshape(row, 2, 3), high.reshape(row, 2, 3)
         nodes[row : 2 * row, :, 0], nodes[row : 2 * row, :, 1] = low, high
-        low, high = low.min(axis=1), high.max(axis=1)
+        low, high = least(low, 1), most(high, 1)
     return nodes
+
+
+def least(numbers: NDArray[Any], axis: int) -> NDArray[Any]:
+    """The minimum along an axis that is short: several times as fast as `min`."""
+    return reduce(np.minimum, np.moveaxis(numbers, axis, 0))
+
+
+def most(numbers: NDArray[Any], axis: int) -> NDArray[Any]:
+    """The maximum along an axis that is short."""
+    return reduce(np.maximum, np.moveaxis(numbers, axis, 0))

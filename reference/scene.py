@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 from math import dist, hypot, inf, isclose
 from pathlib import Path
+from typing import Any
 
 Triple = tuple[float, float, float]
 
@@ -113,9 +114,7 @@ def merge_coincident(scene: Scene) -> Scene:
     Compared on the decimals as written, without rounding. Planes coincide whichever way their normals point.
     """
     return replace(
-        scene,
-        spheres=tuple(scene.spheres[place] for place in _first_spheres(scene)),
-        planes=tuple(scene.planes[place] for place in _first_planes(scene)),
+        scene, spheres=_those(scene.spheres, _first_spheres(scene)), planes=_those(scene.planes, _first_planes(scene))
     )
 
 
@@ -129,15 +128,21 @@ def distinct_planes(scene: Scene) -> dict[str, Plane]:
     return {f"plane {place + 1}": scene.planes[place] for place in _first_planes(scene)}
 
 
-def _first_spheres(scene: Scene) -> Iterable[int]:
+def _those(surfaces: tuple[Any, ...], places: Collection[int]) -> tuple[Any, ...]:
+    return surfaces if len(places) == len(surfaces) else tuple(surfaces[place] for place in places)
+
+
+def _first_spheres(scene: Scene) -> Collection[int]:
+    if len({sphere.centre for sphere in scene.spheres}) == len(scene.spheres):  # soon seen of a million
+        return range(len(scene.spheres))
     return _first_of_each((sphere.centre, sphere.radius) for sphere in scene.spheres)
 
 
-def _first_planes(scene: Scene) -> Iterable[int]:
+def _first_planes(scene: Scene) -> Collection[int]:
     return _first_of_each(map(_plane_identity, scene.planes))
 
 
-def _first_of_each(identities: Iterable[tuple[object, ...]]) -> Iterable[int]:
+def _first_of_each(identities: Iterable[tuple[object, ...]]) -> Collection[int]:
     """The first place of each identity."""
     first: dict[tuple[object, ...], int] = {}
     for place, identity in enumerate(identities):

@@ -140,8 +140,10 @@ def geometry(scene: Scene) -> NDArray[np.float64]:
 def shading(scene: Scene) -> NDArray[np.float64]:
     """A row of eight for each surface: its colour, diffuse and reflection coefficient, and zeros."""
     surfaces: tuple[Sphere | Plane, ...] = (*scene.spheres, *scene.planes)
-    rows = [column(surfaces, "colour", 3), column(surfaces, "diffuse"), column(surfaces, "reflection")]
-    return np.hstack([*rows, np.zeros((len(surfaces), 3))])
+    rows = np.zeros((len(surfaces), MATERIAL))
+    rows[:, :3] = column(surfaces, "colour", 3)
+    rows[:, 3:4], rows[:, 4:5] = column(surfaces, "diffuse"), column(surfaces, "reflection")
+    return rows
 
 
 def pixel_places(rows: Rows, width: int, pixel: Number) -> tuple[Number, Number]:

@@ -57,7 +57,7 @@ class World(Rows):
         spheres, materials = geometry(scene), shading(scene)
         _check_magnitudes(scene, spheres, types)
         tree, order = None, np.arange(len(spheres))
-        if len(materials) > UNROLLED and is_convention(model) and np.abs(spheres).max(initial=0) < LARGEST["single"]:
+        if len(materials) > UNROLLED and is_convention(model) and _largest(spheres) < LARGEST["single"]:
             tree = Tree(single, spheres[:, :3], spheres[:, 3])
             order = tree.order
         self.model, self.scene = model, scene
@@ -65,11 +65,12 @@ class World(Rows):
         self.light_on_sphere = bool(lit.any())
         planes = [(*p.point, 0, *p.unit_normal, p.distance_from(model.light)) for p in scene.planes]
         rows = np.zeros((len(materials), 8))
-        rows[: len(order), :6] = np.column_stack([spheres[order], lit[order], order])
+        rows[: len(order), :4], rows[: len(order), 4], rows[: len(order), 5] = spheres[order], lit[order], order
         rows[len(order) :] = planes or 0
         super().__init__(types, len(order), rows, 8, tree)
         self.listed = upload(self.Index, order.astype(np.uint32)) if tree else None
-        self.materials = Rows(types, len(order), np.concatenate([materials[order], materials[len(order) :]]), MATERIAL)
+        listed = np.append(order, np.arange(len(order), len(materials)))
+        self.materials = Rows(types, len(order), materials[listed], MATERIAL)
         self.ambient = self.Vector(*map(self.uniform, scene.ambient))
         self.ambient_coefficient = self.uniform(scene.ambient_coefficient)
         self.light = self.Vector(*map(self.uniform, model.light))
@@ -111,9 +112,14 @@ class World(Rows):
 def _check_magnitudes(scene: Scene, spheres: NDArray[np.float64], types: Types) -> None:
     """Raise InputError for coordinates so large that their squares would overflow unseen."""
     precision = "double" if types.Float is types.Double else "single"
-    numbers = np.append(spheres, column(scene.planes, "point", 3))
-    if (found := np.abs(numbers).max(initial=0)) > LARGEST[precision]:
+    found = max(_largest(spheres), _largest(column(scene.planes, "point", 3)))
+    if found > LARGEST[precision]:
         raise InputError(f"expected coordinates up to {LARGEST[precision]:g} in {precision} precision, found {found:g}")
+
+
+def _largest(numbers: NDArray[np.float64]) -> float:
+    """The largest magnitude."""
+    return float(max(numbers.max(initial=0), -numbers.min(initial=0)))
 
 
 def _lit(scene: Scene, spheres: NDArray[np.float64]) -> NDArray[np.bool_]:

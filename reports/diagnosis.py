@@ -68,7 +68,7 @@ def diagnose(suspects: Suspects, levels: NDArray[Any], facts: Facts) -> list[Cau
     singles = sorted(suspects.singles, key=lambda single: distance(picture, single.blocks))
     found = weigh(singles[:CLOSEST] if again else singles)
     found += weigh(speckles(suspects, levels))
-    enough = SURE if facts.lossy else 1 - 2 * LEFT
+    enough = SURE if facts.lossy else 1.0
     if not _is_settled(picture, enough, found, kept):
         found += weigh(fitted(suspects, picture, light=_best(found)[0] < NAMED))
     if not _is_settled(picture, enough, found, kept):

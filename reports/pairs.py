@@ -13,6 +13,7 @@ from reports.suspects import Hypothesis, Levels, Suspects, blocks, distance
 SIDE = 60  # blocks a side, or so, on which pairs are guessed at
 SKETCHED, DRAWN = 24, 6  # pairs that are drawn small, and whole
 DIM = 4.0  # levels, below which a ratio tells nothing
+BRIGHT, WHITE = 16.0, 254.0  # levels between which a ratio tells much
 
 Pair = tuple[Hypothesis, Hypothesis]
 
@@ -42,7 +43,7 @@ def _guessed(suspects: Suspects, picture: Levels, singles: Sequence[Hypothesis])
     guesses = []
     for one, other in combinations(range(len(singles)), 2):
         if _row(singles[one]) != _row(singles[other]):
-            made = _guesses(singles[one], singles[other], right, alone[one], alone[other])
+            made = _guesses(singles[one], singles[other], right, alone[one], alone[other], target)
             guesses.append((min(distance(guess, target) for guess in made), one, other))
     return [(singles[one], singles[other]) for _, one, other in sorted(guesses)]
 
@@ -51,13 +52,24 @@ def _row(single: Hypothesis) -> str:
     return single.ids[0].partition("/")[0]
 
 
-def _guesses(a: Hypothesis, b: Hypothesis, right: Levels, one: Levels, other: Levels) -> Iterator[Levels]:
+def _guesses(
+    a: Hypothesis, b: Hypothesis, right: Levels, one: Levels, other: Levels, target: Levels
+) -> Iterator[Levels]:
     """Guesses at a pair's picture: what each adds, added; what each dims, multiplied; one done to the other's."""
     yield np.clip(one + other - right, 0, 255)
     yield np.clip(one * (other / np.maximum(right, DIM)), 0, 255)
     for first, second in ((one, b), (other, a)):
         if transform := ON_LEVELS.get(second.ids[0]):
             yield transform(first)
+        if second.ids == ("Q6",):
+            yield scaled(first, target)
+
+
+def scaled(levels: Levels, target: Levels) -> Levels:
+    """Levels times what makes most of them those of the target, as a picture that is divided by its largest level."""
+    bright = (levels > BRIGHT) & (levels < WHITE)
+    share = float(np.median(target[bright] / levels[bright])) if bright.any() else 1.0
+    return np.asarray(np.clip(levels * np.float32(share), 0, 255), np.float32)
 
 
 ON_LEVELS: dict[str, Callable[[Levels], Levels]] = {

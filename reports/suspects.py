@@ -33,7 +33,7 @@ QUIET = 1.0  # levels that a block may be off without a reason
 MOST = 48.0  # levels: a block that is farther off counts no more
 KEPT = 96  # pictures as a file keeps them, that are kept
 PAIR_COST, FIT_COST = 1.7, 1.3  # how many times as much a second mistake, or a number, must explain of what is left
-LEFT = 0.004  # of the difference: what is left unexplained that tells nothing
+LEFT = 0.002  # of the difference: what is left unexplained that tells nothing
 
 
 class Hypothesis:

@@ -167,8 +167,8 @@ def prove(
         for kind, picture in harmless(scene, view):
             if not passes(tallies["harmless"], picture):
                 tallies["harmless"].failed.append(f"{name}: {kind}")
-        for other in sides:
-            other_sizes(scene, view.depth, other, tallies["sizes"], name)
+        for length in sides:
+            other_sizes(scene, view.depth, length, tallies["sizes"], name)
         seen = []
         for key, mistake in MISTAKES.items():
             pixels = quantise(planted(scene, view, mistake))
