@@ -159,8 +159,9 @@ def blocks(levels: NDArray[Any], size: int) -> Levels:
     height, width = (side // size * size for side in levels.shape[:2])
     if size == 1:
         return np.asarray(levels, np.float32)
-    parts = levels[:height, :width].reshape(height // size, size, width // size, size, -1)
-    return np.asarray(np.add.reduce(np.add.reduce(parts, 3, np.float32), 1) / size**2, np.float32)
+    rows = np.add.reduce(levels[:height, :width].reshape(height // size, size, width, -1), 1, np.float32)
+    parts = rows.reshape(height // size, width // size, size, -1)
+    return np.asarray(sum(parts[:, :, part] for part in range(size)) / np.float32(size**2), np.float32)
 
 
 def distance(one: Levels, other: Levels) -> float:

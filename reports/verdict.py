@@ -181,7 +181,8 @@ def _blocks(values: NDArray[Any], side: int) -> NDArray[Any]:
     height, width, *channels = values.shape
     padded = np.pad(values, [(0, -height % side), (0, -width % side), *[(0, 0)] * len(channels)])
     rows, columns = padded.shape[0] // side, padded.shape[1] // side
-    return np.asarray(padded.reshape(rows, side, columns, side, *channels).max(axis=(1, 3)))
+    rows_only = padded.reshape(rows, side, columns * side, *channels).max(axis=1)  # first, which is fast
+    return np.asarray(rows_only.reshape(rows, columns, side, *channels).max(axis=2))
 
 
 def _label(wrong: Mask) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
@@ -241,5 +242,6 @@ def _offset(envelope: Envelope, found: Levels, stored: list[Levels], facts: Fact
 def _sums(values: Levels, side: int) -> NDArray[np.float32]:
     height, width, channels = values.shape
     padded = np.pad(values, ((0, -height % side), (0, -width % side), (0, 0)))
-    tiled = padded.reshape(padded.shape[0] // side, side, padded.shape[1] // side, side, channels)
-    return np.asarray(tiled.sum(axis=(1, 3)))
+    rows, columns = padded.shape[0] // side, padded.shape[1] // side
+    rows_only = padded.reshape(rows, side, columns * side, channels).sum(axis=1)
+    return np.asarray(rows_only.reshape(rows, columns, side, channels).sum(axis=2))
