@@ -16,7 +16,7 @@ help:  ## Say what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 report: $(READY) renderers  ## Draw the four examples in every renderer there is and write out/report.html
-	@$(BIN)/crossray check --out out || test $$? -eq 1  # 1: the report is written and something disagrees
+	@$(BIN)/crossray check --terms --out out || test $$? -eq 1  # 1: the report is written and something disagrees
 
 test: $(READY) renderers cycles browser lint  ## Check style and types, run the tests
 	$(BIN)/python -m pytest

@@ -24,7 +24,7 @@ RIVAL = 3.0  # times as much as the best leaves unexplained, what another that i
 GUESS = 0.25  # the least share of a cause that is listed
 PLAIN, FEW = 5.0, 0.002  # levels that a block is off beyond doubt, and the share of blocks that may be
 AUDIBLE = 1.1  # times the noise of its file: what a difference must be at least
-SURE = 0.985  # the share of a JPEG's difference from which on nothing else is looked for
+SURE = 0.985  # the share of the difference from which on nothing else is looked for, where a JPEG is not done again
 CLOSEST = 12  # mistakes that are put through a JPEG as the picture was
 LISTED = 5
 
@@ -68,7 +68,7 @@ def diagnose(suspects: Suspects, levels: NDArray[Any], facts: Facts) -> list[Cau
     singles = sorted(suspects.singles, key=lambda single: distance(picture, single.blocks))
     found = weigh(singles[:CLOSEST] if again else singles)
     found += weigh(speckles(suspects, levels))
-    enough = SURE if facts.lossy else 1.0
+    enough = SURE if facts.lossy and not again else 1.0
     if not _is_settled(picture, enough, found, kept):
         found += weigh(fitted(suspects, picture, light=_best(found)[0] < NAMED))
     if not _is_settled(picture, enough, found, kept):

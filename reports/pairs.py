@@ -11,7 +11,8 @@ from reference.mistakes import MISTAKES, Mistake, combine
 from reports.suspects import Hypothesis, Levels, Suspects, blocks, distance
 
 SIDE = 60  # blocks a side, or so, on which pairs are guessed at
-SKETCHED, DRAWN = 24, 6  # pairs that are drawn small, and whole
+SKETCHED, DRAWN = 24, 7  # pairs that are drawn small, and whole
+BEST = 2  # of the guesses are drawn whole in any case: a small picture has another largest level
 DIM = 4.0  # levels, below which a ratio tells nothing
 BRIGHT, WHITE = 16.0, 254.0  # levels between which a ratio tells much
 
@@ -29,7 +30,8 @@ def pairs(suspects: Suspects, picture: Levels, singles: Sequence[Hypothesis]) ->
             sketched.append((distance(rough, made), len(sketched), (one, other), both))
         if len(sketched) == SKETCHED:
             break
-    for _, _, (one, other), both in sorted(sketched)[:DRAWN]:
+    chosen = [*sketched[:BEST], *sorted(sketched[BEST:])][:DRAWN]
+    for _, _, (one, other), both in chosen:
         ids, mistakes = (*one.ids, *other.ids), (*one.mistakes, *other.mistakes)
         if found := suspects.suspect(ids, mistakes, both):
             yield found
