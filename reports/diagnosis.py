@@ -91,12 +91,12 @@ def _is_settled(
 
 
 def _causes(found: list[tuple[float, Hypothesis]]) -> list[Cause]:
-    """The best of each mistake, without those that explain next to nothing."""
+    """The best of each mistake, without those that explain next to nothing, or are a better one and something more."""
     best = _best(found)[0]
     causes: list[Cause] = []
     for share, hypothesis in sorted(found, key=lambda pair: pair[1].rank(pair[0])):
         cause = _cause(share, hypothesis, share >= NAMED and 1 - share <= RIVAL * max(1 - best, LEFT))
-        if share >= GUESS and cause.id not in [known.id for known in causes]:
+        if share >= GUESS and not any({*known.parts} <= {*cause.parts} for known in causes):
             causes.append(cause)
     return causes[:LISTED]
 

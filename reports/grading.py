@@ -105,7 +105,7 @@ def _wrong(
     where = _where(bounds, excess)
     advice = _what_else(task, submission.levels) or unlike(bounds, submission) or ""
     found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels, submission.facts)
-    causes = [_cause(cause, where) for cause in _telling(found)]
+    causes = [_cause(cause, where) for cause in found]
     features: list[str] = next((cause["features"] for cause in causes if cause["named"]), [])
     if not features and not advice:
         features = list(locate(task.scene, view, excess))
@@ -139,22 +139,15 @@ def _where(bounds: Envelope, excess: NDArray[Any]) -> str:
     return "on " + " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def _telling(causes: list[Cause]) -> list[Cause]:
-    """Without those that are the first and something more, where the first is good enough by itself."""
-    if not causes or not causes[0].named:
-        return causes
-    first = set(causes[0].parts)
-    return [causes[0], *(cause for cause in causes[1:] if not first <= set(cause.parts))]
-
-
 def _cause(cause: Cause, where: str) -> dict[str, Any]:
+    mistakes = "this mistake" if len(cause.parts) == 1 else "both mistakes"
     return {
         "id": cause.id,
         "title": cause.title,
         "share": cause.share,
         "hint": cause.hint,
         "looks": cause.looks,
-        "evidence": f"The scene drawn with this mistake explains {100 * cause.share:.0f} % of the difference, {where}.",
+        "evidence": f"The scene drawn with {mistakes} explains {100 * cause.share:.0f} % of the difference, {where}.",
         "where": where,
         "features": list(cause.features),
         "named": cause.named,
