@@ -25,6 +25,7 @@ SHOWN_RUNS = 30  # of the history
 SPARKLINE = (120, 24)  # pixels
 LARGER = 400  # pixels: a term of the reference
 LONGEST_TEXT = 100_000  # characters of a scene file
+SHOWN = 50  # pixels that differ, in tables and on thumbnails; the viewer marks all that are listed
 
 
 def page(folder: Path, results: dict[str, Any]) -> str:
@@ -52,6 +53,7 @@ def page(folder: Path, results: dict[str, Any]) -> str:
         thumbnail=cache(lambda name: thumbnail(folder, name)),
         larger=lambda name: thumbnail(folder, name, LARGER),
         longest=LONGEST_TEXT,
+        shown=SHOWN,
         left_out=sum(_is_left_out(picture, embedded) for scene in scenes for picture in _pictures(scene)),
         settings=SETTINGS,
         thresholds=[f"{level:g}" for level in THRESHOLDS],

@@ -26,7 +26,7 @@ from reports.raytree import ray_tree
 from reports.recording import read_run
 
 AMPLIFIED = 32  # the difference picture: 8 levels of error are white
-WORST = 50  # pixels listed for each comparison
+WORST = 500  # pixels listed for each comparison
 TREES = 12  # of them have their rays told
 MANY = 200  # surfaces, from which on no rays are told: each tree would name them all
 

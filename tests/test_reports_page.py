@@ -237,6 +237,18 @@ def test_pictures_that_are_no_numbers_show_in_the_difference(tmp_path: Path) -> 
     assert read_image(tmp_path / f"{comparison['difference']}.png")[20, 30].min() == 255
 
 
+def test_many_pixels_are_listed_and_some_of_them_shown(tmp_path: Path) -> None:
+    places = [(column, row) for row in range(4, 10) for column in range(100)]
+    off = altered(*((column, row, 110 + column) for column, row in places))
+    record(tmp_path, {"many.txt": [(facts("native"), GREY), (facts("povray"), off)]})
+    comparison = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["scenes"][0]["comparisons"][0]
+    assert comparison["pixels"]["unexplained"] == len(places) == 600
+    assert len(comparison["worst"]) == 500
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "the 50 worst of 600 pixels that differ" in text
+    assert text.count("data-pixel=") == 50
+
+
 @pytest.mark.parametrize(
     "paths",
     [
