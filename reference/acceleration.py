@@ -49,7 +49,7 @@ class Tree:
         leaves, counts = sort(centres)
         self.order: NDArray[np.intp] = leaves[counts]
         self.ends = upload(types.Index, np.append(0, np.cumsum(counts.sum(axis=1))).astype(np.uint32))
-        inside, reach = centres[leaves], radii[leaves, None]
+        inside, reach = np.take(centres, leaves, axis=0), np.take(radii, leaves)[..., None]
         low, high = inside - reach, inside + reach
         low, high = (least(low, 1), most(high, 1)) if len(centres) else (np.zeros((1, 3)), np.zeros((1, 3)))
         first, last = low.min(axis=0), high.max(axis=0)
