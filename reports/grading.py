@@ -22,6 +22,7 @@ from reports.envelope import Envelope, envelope
 from reports.gradebook import Task, empty_record
 from reports.gradeimages import SMALL, THUMB, Album, surroundings, worst_channel
 from reports.location import locate
+from reports.lookalike import look_again
 from reports.rays import pixel_sentence, ray_rows
 from reports.raytree import ray_tree
 from reports.recording import slug
@@ -34,6 +35,10 @@ SHARED = "pictures/_right"  # which is no student's
 LISTED = 20  # blobs
 RIGHT = "Every pixel is one that a right tracer could have made."
 ROUNDED = "Right, with levels rounded that the document truncates: no pixel is off by more than one level."
+TOGETHER = {  # why pixels are wrong of which each might be right
+    "displaced": "all of them displaced alike",
+    "lookalike": "all of them as a known mistake draws them",
+}
 KEPT = 2  # scenes and sizes of which a worker keeps what is dear
 MOSTLY = 0.9  # of the wrong pixels are on the objects that are named
 STRANGE = 0.5  # of the picture wrong without a known mistake: it may be one of something else
@@ -53,7 +58,7 @@ def grade_picture(task: Task) -> dict[str, Any]:
     height, width = submission.levels.shape[:2]
     view = View(width, height, task.depth)
     bounds = _bounds(task.scene, view)
-    verdict = judge(bounds, submission)
+    verdict = look_again(judge(bounds, submission), lambda: _suspects(task.scene, view), submission)
     record = empty_record(task.entry, "graded", "") | {"width": width, "height": height}
     record["format"] = f"{width} x {height}, {_format(submission.facts)}"
     album = Album(task.folder, task.side, task.exact)
@@ -91,10 +96,10 @@ def _excess(verdict: Verdict, submission: Submission, bounds: Envelope) -> NDArr
     wrong = worst_channel(verdict.outside) > OUTSIDE
     if "offset" in verdict.reasons:
         wrong = wrong | verdict.offset_area
-    if not wrong.any():
-        wrong = worst_channel(error) > OUTSIDE
-    excess = np.where(wrong[..., None], np.maximum(verdict.outside, error * verdict.offset_area[..., None]), 0)
-    return excess if excess.any() else error
+    if wrong.any():
+        return np.where(wrong[..., None], np.maximum(verdict.outside, error * verdict.offset_area[..., None]), 0)
+    far = np.where((worst_channel(error) > OUTSIDE)[..., None], error, 0)
+    return far if far.any() else error
 
 
 def _wrong(
@@ -110,9 +115,11 @@ def _wrong(
     if not features and not advice:
         features = list(locate(task.scene, view, excess))
     share = f"{outside / (view.width * view.height):.2%}".replace(".00%", "%").replace("%", " %")
+    all_together = next((TOGETHER[reason] for reason in verdict.reasons if reason in TOGETHER), "")
+    what = "cannot be right" if verdict.count or not all_together else f"are off, {all_together}"
     return {
         "verdict": "wrong",
-        "reason": f"{outside} of {view.width * view.height} pixels ({share}) cannot be right, {where}.",
+        "reason": f"{outside} of {view.width * view.height} pixels ({share}) {what}, {where}.",
         "outside": outside,
         "advice": advice or _advice(outside / (view.width * view.height), features),
         "features": features,

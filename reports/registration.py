@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,8 @@ TILE = 32  # pixels: what is independent of what
 LEAST = 0.3  # pixels that count
 EXPLAINED = 0.15  # of the difference's variance at edges, at least
 DIFFERENT = 0.5  # of the variance that samples at the centres have: what has less is antialiased
-SURE = 6.0  # standard errors
-TILES = 12  # that must hold edges
+SURE = 4.5  # standard errors
+TILES = 6  # that must hold edges
 
 
 @dataclass(frozen=True)
@@ -29,17 +30,23 @@ class Displacement:
     significant: bool
 
 
-def displacement(envelope: Envelope, found: NDArray[np.float32]) -> Displacement:
-    """Least squares of the difference on the gradient of the mean over pixels, with errors from tile to tile.
+def displacement(
+    envelope: Envelope,
+    found: NDArray[np.float32],
+    stored: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None,
+) -> Displacement:
+    """Least squares of the difference on the gradient of the mean over pixels; errors by chance, and from tile to tile.
 
     A step that moves by a part of a pixel changes that part of the pixels along it, so that the gradient tells it
-    without bias; samples at random places in the pixel, or many, do not move it.
+    without bias; samples at random places in the pixel, or many, do not move it. `stored` is what the picture's file
+    would make of the mean and of samples at the centres: a JPEG moves edges, too.
     """
     mean = envelope.mean.sum(axis=-1)
     height, width = mean.shape
     if min(height, width) < 3:
         return Displacement(0, 0, 0, 0, 0, False)
-    difference = found.sum(axis=-1) - mean
+    flat, centres = (side.sum(axis=-1) for side in stored or (envelope.mean, envelope.centre))
+    difference = found.sum(axis=-1) - flat
     vertical, horizontal = np.gradient(mean)
     edges = (envelope.high - envelope.low).max(axis=-1) > 4
     rows, columns = np.nonzero(edges)
@@ -55,14 +62,28 @@ def displacement(envelope: Envelope, found: NDArray[np.float32]) -> Displacement
     fitted = inverse @ (design.T @ target)
     left = target - design @ fitted
     explained = 1 - float(left @ left) / max(float(target @ target), 1e-9)
-    scores = design * left[:, None]
     tiles = rows // TILE * (width // TILE + 1) + columns // TILE
-    sums = np.column_stack([np.bincount(tiles, weights=scores[:, k]) for k in range(4)])
     used = len(np.unique(tiles))
-    error = np.sqrt(np.diag(inverse @ (sums.T @ sums) @ inverse) * used / max(used - 1, 1))
-    usual = (envelope.centre.sum(axis=-1) - mean)[rows, columns].astype(float)
+    sums = np.column_stack([np.bincount(tiles, weights=score) for score in (design * left[:, None]).T])
+    alike = _variance(inverse, sums) * used / max(used - 1, 1)  # pixels of a tile may be off together
+    error = np.sqrt(np.maximum(alike, _variance(inverse, design * _by_chance(envelope, edges)[:, None])))
+    usual = (centres - flat)[rows, columns].astype(float)
     different = float(target @ target) > DIFFERENT * float(usual @ usual)
     sure = (np.abs(fitted) > LEAST) & (np.abs(fitted) > SURE * error)
     significant = bool(sure.any()) and different and used >= TILES and explained > EXPLAINED
     right, down, wider, taller = map(float, fitted)
     return Displacement(right, down, wider, taller, explained, significant)
+
+
+def _variance(inverse: NDArray[Any], scores: NDArray[Any]) -> NDArray[Any]:
+    """Of each number that is fitted, from independent scores: N x 4."""
+    return np.asarray(np.diag(inverse @ (scores.T @ scores) @ inverse))
+
+
+def _by_chance(envelope: Envelope, edges: NDArray[np.bool_]) -> NDArray[Any]:
+    """The standard deviation, summed over channels, of pixels at edges that are sampled once, anywhere in the pixel.
+
+    Each shows the least or the most there is, as often as gives the mean.
+    """
+    low, high, mean = (side[edges].sum(axis=-1) for side in (envelope.low, envelope.high, envelope.mean))
+    return np.asarray(np.sqrt(np.maximum((high - mean) * (mean - low), 0)))

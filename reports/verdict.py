@@ -28,8 +28,9 @@ SPECKS = 5e-4  # of all pixels that may be outside one by one
 MEAN = 1.05  # levels by which the mean of an area may differ beyond truncating and rounding
 AREA = 5e-3  # of all pixels, which such an area must have
 FLAT = 2.0  # levels: a pixel whose samples differ by no more is no edge
-SAME_PIXELS, SAME_BLOCKS = 0.85, 0.35  # of those that tell whether pixels are sampled at their centres
+SAME_PIXELS, SAME_BLOCKS = 0.85, 0.5  # of those that tell whether pixels are sampled at their centres
 TELLING = 8  # pixels or blocks that must tell it
+RIGHT = 5  # of the guesses at a right picture are right
 CONNECTED = np.ones((3, 3), bool)
 LISTED = 50  # blobs at most
 
@@ -85,7 +86,7 @@ def judge(envelope: Envelope, submission: Submission) -> Verdict:
     labels, sizes = _label(wrong)
     large = np.flatnonzero(sizes > (4 * BLOB if facts.lossy and exact else BLOB))
     offset, area = _offset(envelope, found, stored, facts)
-    moved = displacement(envelope, found)
+    moved = displacement(envelope, found, (stored[2], stored[0]) if facts.tables else None)
     reasons = {
         "blobs": large.size > 0,
         "specks": int(wrong.sum()) > max(16, SPECKS * wrong.size) * (4 if facts.lossy else 1),
@@ -116,13 +117,14 @@ def store(levels: Levels, facts: Facts) -> Levels:
 
 
 def _guesses(envelope: Envelope) -> list[Levels]:
-    """Pictures in 8 bit that are right: truncated, rounded, antialiased and sampled at random places.
+    """Pictures in 8 bit that are right: truncated, rounded, antialiased and two sampled at random places.
 
     And two that are nearly so: a level too dark, and a level too bright.
     """
     centre, part = envelope.centre, np.random.default_rng(0).random(envelope.centre.shape[:2], np.float32)[..., None]
     random = envelope.low + (envelope.high - envelope.low) * part
-    pictures = [centre, np.rint(centre), np.rint(envelope.mean), random, centre - 1, centre + 1]
+    either = np.where(part < 0.5, envelope.low, envelope.high)
+    pictures = [centre, np.rint(centre), np.rint(envelope.mean), random, either, centre - 1, centre + 1]
     return [quantise(picture).astype(np.float32) for picture in pictures]
 
 
@@ -136,7 +138,8 @@ def _is_exact(found: Levels, stored: list[Levels], facts: Facts) -> bool:
     telling = _blocks(_worst(np.abs(stored[2] - stored[1])), side) > 2 * OUTSIDE
     off = [_blocks(_worst(np.abs(found - picture)), side) for picture in stored[:2]]
     same = np.min(off, axis=0) <= 2 * ROUNDING
-    return bool(same[telling].mean() >= least if telling.sum() >= TELLING else same.all())
+    number = int(telling.sum())
+    return bool(same[telling].sum() >= max(least * number, TELLING) if number >= TELLING else same.all())
 
 
 def _bounds(
@@ -145,13 +148,14 @@ def _bounds(
     """The least and the most of each channel that the file may hold."""
     if exact:
         about = ROUNDING + (2 if facts.lossy else 0)
-        centres = [stored[0], stored[1], *stored[4:]] if facts.lossy else stored[:1]
+        centres = [*stored[:2], *stored[RIGHT:]] if facts.lossy else stored[:1]
         return reduce(np.minimum, centres) - about, reduce(np.maximum, centres) + about
     low, high = envelope.low - ROUNDING, envelope.high + ROUNDING
     if not facts.tables:
         unknown = 24 if facts.lossy else 0
         return low - unknown, high + unknown
-    error = reduce(np.maximum, [np.abs(after - before) for after, before in zip(stored[:4], guesses, strict=False)])
+    kept = zip(stored[:RIGHT], guesses[:RIGHT], strict=True)
+    error = reduce(np.maximum, [np.abs(after - before) for after, before in kept])
     slack = (1.25 * _over_blocks(error, _block(facts)) + 2).astype(np.float32)
     return low - slack, high + slack
 
@@ -224,7 +228,8 @@ def _offset(envelope: Envelope, found: Levels, stored: list[Levels], facts: Fact
     if not enough.any():
         return 0.0, np.zeros((height, width), bool)
     means = [
-        _sums((picture - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1) for picture in stored[:4]
+        _sums((picture - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1)
+        for picture in stored[:RIGHT]
     ]
     mean = _sums((found - envelope.centre) * smooth[..., None], side) / np.maximum(count, 1)
     steps = [table[0] for table in facts.tables[:1] + facts.tables[-1:]]  # of a block's mean, times 8

@@ -4,6 +4,7 @@ import io
 import resource
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -123,6 +124,15 @@ def test_bands_that_end_early_leave_no_file(ending: str, tmp_path: Path) -> None
     with pytest.raises(OutputError):
         write_bands(tmp_path / f"a{ending}", 50, 37, iter([noise(36, 50)]))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_the_same_picture_is_the_same_file_at_any_time(ending: str, tmp_path: Path) -> None:
+    files = [tmp_path / (name + ending) for name in ("early", "late")]
+    for file in files:
+        write_image(file, noise(5, 4))
+        time.sleep(1.1)  # a date in the file would tell
+    assert files[0].read_bytes() == files[1].read_bytes()
 
 
 @pytest.mark.parametrize("ending", ENDINGS)

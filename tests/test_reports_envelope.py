@@ -82,6 +82,21 @@ def test_harmless_pictures_of_the_usual_size_are_right(tmp_path: object) -> None
     assert judge(bounds("example1", 1000), jpeg(kinds["antialiased"], 60, 2, tmp_path)).right
 
 
+@pytest.mark.parametrize("name", ["eye_inside", "near_unit", "thin_gap"])
+@pytest.mark.parametrize("seed", range(4))
+def test_few_edges_sampled_at_random_through_jpeg(name: str, seed: int, tmp_path: object) -> None:
+    """Where little tells how pixels are sampled, and chance may move what edges there are."""
+    random = np.random.default_rng([seed, 107])
+    known = bounds(f"diagnostic/{name}")
+    low, high, mean = known.low, known.high, known.mean
+    part = (mean - low).sum(axis=-1) / np.maximum((high - low).sum(axis=-1), 1e-9)
+    jittered = np.where(random.random(part.shape)[..., None] < part[..., None], high, low)
+    for quality, subsampling in ((50, 0), (75, 0), (75, 2), (90, 2)):
+        verdict = judge(known, jpeg(quantise(jittered), quality, subsampling, tmp_path))
+        assert verdict.right, (quality, subsampling, verdict.reasons)
+        assert not verdict.exact
+
+
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_mistakes_are_caught(name: str) -> None:
     for id_, mistake in MISTAKES.items():

@@ -16,6 +16,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import repeat
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,7 @@ from reference.world import View
 from reports.diagnosis import diagnose
 from reports.envelope import envelope
 from reports.gradebook import usable_cores
+from reports.lookalike import look_again
 from reports.submission import Facts, Submission
 from reports.suspects import Suspects
 from reports.verdict import judge
@@ -145,10 +147,11 @@ def other_rules(right: Pixels, found: NDArray[Any]) -> dict[str, bool]:
 
 def other_sizes(scene: Scene, depth: int, side: int, tally: Tally, name: str) -> None:
     """Judge right pictures of one scene at another size."""
-    bounds = envelope(scene, side, side, depth)
-    for kind, picture in harmless(scene, View(side, side, depth), few=True):
+    view = View(side, side, depth)
+    bounds, suspects = envelope(scene, side, side, depth), cache(lambda: Suspects(scene, view))
+    for kind, picture in harmless(scene, view, few=True):
         tally.pictures += 1
-        if judge(bounds, picture).right:
+        if look_again(judge(bounds, picture), suspects, picture).right:
             tally.passed += 1
         else:
             tally.failed.append(f"{name}: {side} x {side}, {kind}")
@@ -193,7 +196,7 @@ def prove_scene(name: str, side: int, pairs: int, sides: tuple[int, ...]) -> dic
         tally.pictures += 1
         for rule, good in other_rules(right, picture.levels).items():
             tally.rules[rule] = tally.rules.get(rule, 0) + good
-        good = judge(bounds, picture).right
+        good = look_again(judge(bounds, picture), lambda: suspects, picture).right
         tally.passed += good
         if good != kind.startswith(("harmless", "rounding")):
             tally.failed.append(f"{name}: {title} {'passed' if good else 'failed'}")

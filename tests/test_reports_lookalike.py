@@ -1,0 +1,83 @@
+"""A wrong picture of which each pixel might be right is told by the mistake that draws it; no right one is."""
+
+import sys
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+from helpers import ROOT
+
+sys.path.insert(0, str(ROOT / "tests" / "benchmarks"))
+
+from prove import harmless, jpeg, png, scenes
+
+from reference import DOCUMENT
+from reference.image import quantise
+from reference.mistakes import MISTAKES
+from reference.slips import draw
+from reference.world import View
+from reports.envelope import Envelope, envelope
+from reports.lookalike import look_again
+from reports.submission import Submission
+from reports.suspects import Suspects
+from reports.verdict import Verdict, judge
+
+VIEW = View(250, 250, 3)
+Verdicts = tuple[Verdict, Verdict]
+
+
+@cache
+def bounds(name: str) -> Envelope:
+    return envelope(scenes()[name], VIEW.width, VIEW.height)
+
+
+@cache
+def suspects(name: str) -> Suspects:
+    return Suspects(scenes()[name], VIEW)
+
+
+def verdicts(name: str, picture: Submission) -> Verdicts:
+    """By the envelope alone, and after another look."""
+    first = judge(bounds(name), picture)
+    return first, look_again(first, lambda: suspects(name), picture)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "file"),
+    [
+        ("tangent", "C5", png),
+        ("eye_inside", "C4", png),
+        ("example4", "R7", lambda pixels: jpeg(pixels, 85, "4:2:0")),
+        ("near_front", "Q2", lambda pixels: jpeg(pixels, 85, "4:2:0")),
+        ("bright_ambient", "C5", lambda pixels: jpeg(pixels, 85, "4:2:0")),
+    ],
+)
+def test_hidden_mistakes_are_told(name: str, key: str, file: Callable[[object], Submission]) -> None:
+    first, second = verdicts(name, file(quantise(MISTAKES[key].draw(scenes()[name], VIEW))))
+    assert first.right
+    assert not second.right
+    assert second.reasons == ("lookalike",)
+
+
+@pytest.mark.parametrize("name", ["example4", "tangent", "eye_inside"])
+def test_right_pictures_stay_right(name: str) -> None:
+    for kind, picture in harmless(scenes()[name], VIEW, few=True):
+        assert verdicts(name, picture)[1].right, kind
+
+
+def test_half_of_a_hidden_mistake_is_not_that_mistake() -> None:
+    """What a mistake's picture explains in part only is no proof."""
+    right = quantise(draw(scenes()["tangent"], DOCUMENT, VIEW))
+    wrong = quantise(MISTAKES["C5"].draw(scenes()["tangent"], VIEW))
+    half = np.where(np.arange(VIEW.width)[None, :, None] < VIEW.width // 2, right, wrong)
+    assert verdicts("tangent", png(half))[1].right
+
+
+def test_what_is_right_beyond_doubt_is_not_looked_at_again() -> None:
+    def never() -> Suspects:
+        raise AssertionError
+
+    picture = png(quantise(draw(scenes()["tangent"], DOCUMENT, VIEW)))
+    first = judge(bounds("tangent"), picture)
+    assert look_again(first, never, picture) is first
