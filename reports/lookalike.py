@@ -17,7 +17,7 @@ from reports.verdict import Verdict
 
 VISIBLE = 8.0  # levels that a block must be off the right picture
 SHOWN = 5e-4  # of the blocks that must be so
-LEFT = 0.15  # of the difference: the most that the mistake's picture may leave
+LEFT = 0.5  # of the difference: the most that the mistake's picture may leave; for right pictures it is larger than 1
 CLOSEST = 6  # mistakes that are put through a JPEG as the picture was
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 LARGEST_SIDE = 4096  # pixels; larger pictures are refused before they are decoded
 FORMATS = ("PNG", "JPEG", "BMP", "GIF", "TIFF", "PPM", "WEBP")  # Pillow's names
-LOSSY = ("WEBP",)  # that tell nothing of their quality
+PALETTE = 200  # colours: a picture that has fewer has lost none to a palette of 256
 SUBSAMPLINGS = {0: "4:4:4", 1: "4:2:2", 2: "4:2:0"}  # Pillow's numbers
 EXR = b"v/1\x01"
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -42,7 +42,7 @@ class Facts:
     @property
     def lossy(self) -> bool:
         """Whether the format changes levels by more than it rounds them."""
-        return bool(self.tables) or self.format in (*LOSSY, "GIF")
+        return bool(self.tables)
 
 
 @dataclass(frozen=True)
@@ -68,10 +68,12 @@ def read_submission(path: str | Path) -> Submission:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what a damaged or enormous file says is said below
             Image.init()
-            with Image.open(path, formats=FORMATS) as image:
+            by_ending = ("TGA",) if Path(path).suffix.lower() == ".tga" else ()  # which nothing else tells
+            with Image.open(path, formats=FORMATS + by_ending) as image:
                 _check_size(path, *image.size)
                 facts = _facts(image, start)
                 image.load()
+                _check_losses(path, image, start)
                 deep = facts.format == "PNG" and facts.bits == 16
                 levels = read_image(path).astype(np.float32) if deep else _levels(image)
     except Image.DecompressionBombError:
@@ -104,6 +106,14 @@ def _read_start(path: Path) -> bytes:
 def _check_size(path: str | Path, width: int, height: int) -> None:
     if max(width, height) > LARGEST_SIDE:
         raise InputError(f"{path}: expected at most {LARGEST_SIDE} pixels a side, found {width}x{height}")
+
+
+def _check_losses(path: str | Path, image: Image, start: bytes) -> None:
+    """Refuse what a format has done to levels that nothing tells from a mistake."""
+    if image.mode == "P" and len(image.getcolors() or ()) > PALETTE:
+        raise InputError(f"{path}: expected all colours, found a palette of 256: save a PNG of 24 bit instead")
+    if image.format == "WEBP" and b"VP8L" not in start:
+        raise InputError(f"{path}: expected exact levels or a JPEG, found a lossy WebP: save a PNG instead")
 
 
 def _describe(start: bytes) -> str:

@@ -23,6 +23,7 @@ from reports.submission import Facts, Submission
 
 OUTSIDE = 4.0  # levels out of the envelope that count
 BLOB = 4  # pixels that may be so, connected
+BLOCK = 64  # or so many, where a JPEG is known but for what its encoder rounds otherwise: all of a block
 ROUNDING = 1.0  # levels by which any 8-bit picture may differ
 SPECKS = 5e-4  # of all pixels that may be outside one by one
 MEAN = 1.05  # levels by which the mean of an area may differ beyond truncating and rounding
@@ -84,7 +85,7 @@ def judge(envelope: Envelope, submission: Submission) -> Verdict:
     outside = np.maximum(np.maximum(low - found, found - high), 0)
     wrong = _worst(outside) > OUTSIDE
     labels, sizes = _label(wrong)
-    large = np.flatnonzero(sizes > (4 * BLOB if facts.lossy and exact else BLOB))
+    large = np.flatnonzero(sizes > (BLOCK if facts.lossy and exact else BLOB))
     offset, area = _offset(envelope, found, stored, facts)
     moved = displacement(envelope, found, (stored[2], stored[0]) if facts.tables else None)
     reasons = {
@@ -151,9 +152,8 @@ def _bounds(
         centres = [*stored[:2], *stored[RIGHT:]] if facts.lossy else stored[:1]
         return reduce(np.minimum, centres) - about, reduce(np.maximum, centres) + about
     low, high = envelope.low - ROUNDING, envelope.high + ROUNDING
-    if not facts.tables:
-        unknown = 24 if facts.lossy else 0
-        return low - unknown, high + unknown
+    if not facts.lossy:
+        return low, high
     kept = zip(stored[:RIGHT], guesses[:RIGHT], strict=True)
     error = reduce(np.maximum, [np.abs(after - before) for after, before in kept])
     slack = (1.25 * _over_blocks(error, _block(facts)) + 2).astype(np.float32)

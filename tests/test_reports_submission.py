@@ -16,9 +16,10 @@ SIDE = 24
 PIXELS = np.random.default_rng(2).integers(0, 256, (SIDE, SIDE, 3), np.uint8)
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.bmp", "a.ppm", "a.tif"])
+@pytest.mark.parametrize("name", ["a.png", "a.bmp", "a.ppm", "a.tif", "a.tga", "a.webp"])
 def test_exact_formats(tmp_path: Path, name: str) -> None:
-    Image.fromarray(PIXELS).save(tmp_path / name)
+    options: dict[str, Any] = {"lossless": True} if name == "a.webp" else {}
+    Image.fromarray(PIXELS).save(tmp_path / name, **options)
     read = read_submission(tmp_path / name)
     assert read.levels.dtype == np.float32
     assert (read.levels == PIXELS).all()
@@ -31,6 +32,23 @@ def test_a_jpeg_tells_its_tables(tmp_path: Path, subsampling: int, name: str) ->
     Image.fromarray(PIXELS).save(path, quality=60, subsampling=subsampling)
     facts = read_submission(path).facts
     assert (facts.format, facts.subsampling, len(facts.tables), facts.tables[0][0]) == ("JPEG", name, 2, 13)
+
+
+def test_what_loses_levels_without_telling_how_is_refused(tmp_path: Path) -> None:
+    Image.fromarray(PIXELS).save(tmp_path / "a.webp", quality=80)
+    refuse(tmp_path / "a.webp", "found a lossy WebP: save a PNG")
+    Image.fromarray(PIXELS).save(tmp_path / "a.gif")
+    refuse(tmp_path / "a.gif", "found a palette of 256: save a PNG")
+    Image.fromarray(PIXELS).quantize(256).save(tmp_path / "a.png")
+    refuse(tmp_path / "a.png", "found a palette of 256: save a PNG")
+
+
+def test_a_palette_that_suffices_is_exact(tmp_path: Path) -> None:
+    few = PIXELS // 64 * 64
+    Image.fromarray(few).quantize(64).save(tmp_path / "a.png")
+    read = read_submission(tmp_path / "a.png")
+    assert (read.facts.channels, read.facts.lossy) == ("palette", False)
+    assert (read.levels == few).all()
 
 
 def test_grey_and_sixteen_bit(tmp_path: Path) -> None:
@@ -65,7 +83,7 @@ def test_what_is_no_picture(tmp_path: Path) -> None:
         refuse(tmp_path / "a.png", reason)
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.bmp", "a.ppm", "a.tif", "a.webp", "a.gif"])
+@pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.bmp", "a.ppm", "a.tif", "a.tga", "a.webp", "a.gif"])
 @pytest.mark.parametrize("part", [0.5, 0.9])
 def test_truncated(tmp_path: Path, name: str, part: float) -> None:
     options: dict[str, Any] = {"lossless": True} if name == "a.webp" else {}
