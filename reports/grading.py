@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Mapping
 from functools import lru_cache
 from time import perf_counter
@@ -23,27 +22,19 @@ from reports.gradebook import Task, empty_record
 from reports.gradeimages import SMALL, THUMB, Album, surroundings, worst_channel
 from reports.location import locate
 from reports.lookalike import look_again
+from reports.otherscene import other_scene
 from reports.rays import pixel_sentence, ray_rows
 from reports.raytree import ray_tree
 from reports.recording import slug
-from reports.resemblance import unlike
-from reports.submission import Facts, Submission, read_submission
+from reports.resemblance import blank, unlike
+from reports.sentences import advise, blame, form, praise, where
+from reports.submission import Submission, read_submission
 from reports.suspects import Suspects
 from reports.verdict import OUTSIDE, Blob, Verdict, judge
 
 SHARED = "pictures/_right"  # which is no student's
 LISTED = 20  # blobs
-RIGHT = "Every pixel is one that a right tracer could have made."
-ROUNDED = "Right, with levels rounded that the document truncates: no pixel is off by more than one level."
-TOGETHER = {  # why pixels are wrong of which each might be right
-    "displaced": "all of them displaced alike",
-    "lookalike": "all of them as a known mistake draws them",
-}
 KEPT = 2  # scenes and sizes of which a worker keeps what is dear
-MOSTLY = 0.9  # of the wrong pixels are on the objects that are named
-STRANGE = 0.5  # of the picture wrong without a known mistake: it may be one of something else
-BLANK = 2.0  # levels that one colour may differ by in a JPEG
-SIDE = 100  # pixels at which other scenes are tried
 
 
 def grade_picture(task: Task) -> dict[str, Any]:
@@ -60,14 +51,14 @@ def grade_picture(task: Task) -> dict[str, Any]:
     bounds = _bounds(task.scene, view)
     verdict = look_again(judge(bounds, submission), lambda: _suspects(task.scene, view), submission)
     record = empty_record(task.entry, "graded", "") | {"width": width, "height": height}
-    record["format"] = f"{width} x {height}, {_format(submission.facts)}"
+    record["format"] = f"{width} x {height}, {form(submission.facts)}"
     album = Album(task.folder, task.side, task.exact)
     record["images"] = {
         "thumb": album.save(f"{task.name}-thumb", submission.levels, THUMB),
         "yours": album.save(task.name, submission.levels),
     }
     if verdict.right:
-        record |= {"verdict": "right", "reason": ROUNDED if verdict.rounding else RIGHT, "outside": 0}
+        record |= {"verdict": "right", "reason": praise(verdict), "outside": 0}
     else:
         excess = _excess(verdict, submission, bounds)
         record |= _wrong(task, view, submission, bounds, verdict, excess)
@@ -83,11 +74,6 @@ def _bounds(scene: Scene, view: View) -> Envelope:
 @lru_cache(KEPT)
 def _suspects(scene: Scene, view: View) -> Suspects:
     return Suspects(scene, view)
-
-
-def _format(facts: Facts) -> str:
-    sampling = f", {facts.subsampling}" if facts.subsampling else ""
-    return f"{facts.format}, {facts.bits} bit {facts.channels}{sampling}"
 
 
 def _excess(verdict: Verdict, submission: Submission, bounds: Envelope) -> NDArray[np.float32]:
@@ -107,21 +93,18 @@ def _wrong(
 ) -> dict[str, Any]:
     """What a wrong picture's record says beyond any."""
     outside = int((worst_channel(excess) > 0).sum())
-    where = _where(bounds, excess)
-    advice = _what_else(task, submission.levels) or unlike(bounds, submission) or ""
+    place = where(bounds, excess)
+    advice = blank(bounds, submission) or _other(task, submission) or unlike(bounds, submission) or ""
     found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels, submission.facts)
-    causes = [_cause(cause, where) for cause in found]
+    causes = [_cause(cause, place) for cause in found]
     features: list[str] = next((cause["features"] for cause in causes if cause["named"]), [])
     if not features and not advice:
         features = list(locate(task.scene, view, excess))
-    share = f"{outside / (view.width * view.height):.2%}".replace(".00%", "%").replace("%", " %")
-    all_together = next((TOGETHER[reason] for reason in verdict.reasons if reason in TOGETHER), "")
-    what = "cannot be right" if verdict.count or not all_together else f"are off, {all_together}"
     return {
         "verdict": "wrong",
-        "reason": f"{outside} of {view.width * view.height} pixels ({share}) {what}, {where}.",
+        "reason": blame(verdict, outside, view.width * view.height, place),
         "outside": outside,
-        "advice": advice or _advice(outside / (view.width * view.height), features),
+        "advice": advice or advise(outside / (view.width * view.height), features),
         "features": features,
         "causes": causes,
         "blobs": [_blob(blob) for blob in verdict.blobs[:LISTED]],
@@ -130,23 +113,7 @@ def _wrong(
     }
 
 
-def _where(bounds: Envelope, excess: NDArray[Any]) -> str:
-    """The objects that nearly all wrong pixels are on."""
-    seen = Counter(bounds.objects[(worst_channel(excess) > 0)].tolist())
-    names, told = [], 0
-    for number, count in seen.most_common():
-        names.append(bounds.names[number])
-        told += count
-        if told >= MOSTLY * seen.total():
-            break
-    if len(names) > 4:
-        return "everywhere"
-    if names == ["background"]:
-        return "where nothing is seen"
-    return "on " + " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
-
-
-def _cause(cause: Cause, where: str) -> dict[str, Any]:
+def _cause(cause: Cause, place: str) -> dict[str, Any]:
     mistakes = "this mistake" if len(cause.parts) == 1 else "both mistakes"
     return {
         "id": cause.id,
@@ -154,8 +121,8 @@ def _cause(cause: Cause, where: str) -> dict[str, Any]:
         "share": cause.share,
         "hint": cause.hint,
         "looks": cause.looks,
-        "evidence": f"The scene drawn with {mistakes} explains {100 * cause.share:.0f} % of the difference, {where}.",
-        "where": where,
+        "evidence": f"The scene drawn with {mistakes} explains {100 * cause.share:.0f} % of the difference, {place}.",
+        "where": place,
         "features": list(cause.features),
         "named": cause.named,
         "parts": [{"id": id_, "title": title} for id_, title in cause.parts],
@@ -163,49 +130,9 @@ def _cause(cause: Cause, where: str) -> dict[str, Any]:
     }
 
 
-def _what_else(task: Task, levels: NDArray[Any]) -> str:
-    """What a picture is that nobody drew of the scene, and what to do; empty for one that somebody may have."""
-    if max(float(np.ptp(levels[..., channel])) for channel in range(3)) <= BLANK:
-        return "The whole picture has one colour: did the program write what it has drawn?"
-    if other := _other_scene(task, levels):
-        return f"This is a picture of {other}: is it the right file?"
-    return ""
-
-
-def _advice(share: float, features: list[str]) -> str:
-    """What to do about a picture that shows none of the known mistakes."""
-    if features:
-        return f"The difference lies in the {' and '.join(features)}. Follow the rays of the worst pixel."
-    if share > STRANGE:
-        return "Most of it is unlike the scene: is it a picture of this scene at all, with the assignment's camera?"
-    return "Follow the rays of the worst pixel and compare each number with your program's."
-
-
-def _other_scene(task: Task, levels: NDArray[Any]) -> str | None:
-    """The name of another scene of the class that the picture is closer to than to its own, by far."""
-    small = _small(levels)
-    errors = {
-        name: float(np.abs(_small_right(scene, task.depth) - small).mean()) for name, scene in task.others.items()
-    }
-    best = min(errors, key=errors.__getitem__)
-    own = errors.get(task.entry.scene, np.inf)
-    return best if best != task.entry.scene and errors[best] < min(4.0, own / 3) else None
-
-
-@lru_cache(16)
-def _small_right(scene: Scene, depth: int) -> NDArray[np.float64]:
-    from reference.tracer import render
-
-    return _small(np.asarray(render(scene, DOCUMENT, width=SIDE, height=SIDE, depth=depth)))
-
-
-def _small(levels: NDArray[Any]) -> NDArray[np.float64]:
-    from PIL import Image
-
-    from reference.image import quantise
-
-    image = Image.fromarray(quantise(np.asarray(levels, float))).resize((SIDE // 2, SIDE // 2), Image.Resampling.BOX)
-    return np.asarray(image, np.float64)
+def _other(task: Task, submission: Submission) -> str | None:
+    name = other_scene(task.entry.scene, task.others, task.depth, submission.levels)
+    return f"This is a picture of {name}: is it the right file?" if name else None
 
 
 def _blob(blob: Blob) -> dict[str, Any]:

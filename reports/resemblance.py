@@ -19,23 +19,25 @@ ALIKE = 0.3  # correlation, of levels or of edges: less is no likeness
 Grey = NDArray[np.float64]
 
 
+def blank(envelope: Envelope, submission: Submission) -> str | None:
+    """In one sentence, that the picture has one colour; None where it has more, or should have one."""
+    found = submission.levels
+    if _spread(found) > BLANK * (2 if submission.facts.lossy else 1) or _spread(envelope.centre) <= BLANK:
+        return None
+    if submission.facts.transparent and not found.any():
+        return "The picture is transparent all over: did the program write what it has drawn?"
+    colour = ", ".join(str(int(level)) for level in np.median(found, axis=(0, 1)))
+    return f"The picture is blank, all of it is ({colour}): did the program write what it has drawn?"
+
+
 def unlike(envelope: Envelope, submission: Submission) -> str | None:
     """In one sentence, why the picture cannot be of the scene; None where it can, with whatever mistake.
 
     Turned, mirrored, in another size on the screen, in other colours or negative, a picture is still alike.
     """
-    found, right = submission.levels, envelope.centre
-    least = BLANK * (2 if submission.facts.lossy else 1)
-    if _spread(found) <= least < _spread(right):
-        if submission.facts.transparent and not found.any():
-            return "The picture is transparent all over."
-        colour = ", ".join(str(int(level)) for level in np.median(found, axis=(0, 1)))
-        return f"The picture is blank: all of it is ({colour})."
-    if _spread(right) <= least:
+    if _spread(envelope.centre) <= BLANK or resemblance(envelope.centre, submission.levels) >= ALIKE:
         return None
-    if resemblance(right, found) < ALIKE:
-        return "The picture has nothing in common with this scene; it may be of another one, or no tracer's at all."
-    return None
+    return "The picture has nothing in common with this scene; it may be of another one, or no tracer's at all."
 
 
 def resemblance(right: NDArray[Any], found: NDArray[Any]) -> float:

@@ -16,7 +16,7 @@ from reference.errors import InputError
 from reference.image import quantise
 from reference.model import pixel_direction
 from reports.envelope import Envelope, envelope
-from reports.resemblance import unlike
+from reports.resemblance import blank, unlike
 from reports.submission import Facts, Submission, read_submission
 from reports.verdict import judge
 
@@ -147,9 +147,10 @@ def test_another_size_is_refused() -> None:
 
 def test_what_is_no_picture_of_the_scene() -> None:
     flat = png(np.full((SIDE, SIDE, 3), 40, np.uint8))
-    assert unlike(bounds("example1"), flat) == "The picture is blank: all of it is (40, 40, 40)."
+    assert str(blank(bounds("example1"), flat)).startswith("The picture is blank, all of it is (40, 40, 40):")
     noise = np.random.default_rng(4).integers(0, 256, (SIDE, SIDE, 3), np.uint8)
     assert "nothing in common" in str(unlike(bounds("example1"), png(noise)))
+    assert blank(bounds("example1"), png(noise)) is None
     right = quantise(bounds("example1").centre)
     for picture in (right, right[::-1], right[:, ::-1], right.transpose(1, 0, 2), 255 - right):
         assert unlike(bounds("example1"), png(picture)) is None

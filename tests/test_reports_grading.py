@@ -110,8 +110,8 @@ def test_mistakes_are_named(singles: tuple[int, dict[str, Any]], name: str, mist
     [
         ("other.png", "."),
         ("photograph.jpg", "."),
-        ("black.png", "one colour"),
-        ("white.png", "one colour"),
+        ("black.png", "blank"),
+        ("white.png", "blank"),
     ],
 )
 def test_what_is_no_picture_of_the_scene_has_no_false_cause(
