@@ -27,7 +27,7 @@ from reports.rays import pixel_sentence, ray_rows
 from reports.raytree import ray_tree
 from reports.recording import slug
 from reports.resemblance import blank, unlike
-from reports.sentences import advise, blame, form, praise, where
+from reports.sentences import advise, blame, form, point_aside, praise, where
 from reports.submission import Submission, read_submission
 from reports.suspects import Suspects
 from reports.verdict import OUTSIDE, Blob, Verdict, judge
@@ -98,7 +98,9 @@ def _wrong(
     found = [] if advice else diagnose(_suspects(task.scene, view), submission.levels, submission.facts)
     causes = [_cause(cause, place) for cause in found]
     features: list[str] = next((cause["features"] for cause in causes if cause["named"]), [])
-    if not features and not advice:
+    if not features and not advice and "displaced" in verdict.reasons:
+        features, advice = ["geometry"], point_aside(verdict.displacement)
+    elif not features and not advice:
         features = list(locate(task.scene, view, excess))
     return {
         "verdict": "wrong",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from reports.envelope import Envelope
 from reports.gradeimages import worst_channel
+from reports.registration import LEAST, Displacement
 from reports.submission import Facts
 from reports.verdict import Verdict
 
@@ -56,6 +57,18 @@ def where(bounds: Envelope, excess: NDArray[Any]) -> str:
     if names == ["background"]:
         return "where nothing is seen"
     return "on " + " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def point_aside(moved: Displacement) -> str:
+    """How a picture is displaced as a whole, and what to look at."""
+    told = (
+        (moved.right, "too far right", "too far left"),
+        (moved.down, "too low", "too high"),
+        (moved.wider, "too wide at the right and left border", "too narrow at the right and left border"),
+        (moved.taller, "too tall at the upper and lower border", "too flat at the upper and lower border"),
+    )
+    parts = [f"{abs(size):.1f} pixels {more if size > 0 else less}" for size, more, less in told if abs(size) >= LEAST]
+    return f"Everything is {', '.join(parts)}: which point of the screen does a pixel's ray go through?"
 
 
 def advise(share: float, features: Sequence[str]) -> str:

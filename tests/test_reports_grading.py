@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ import crossray as command_line
 from reference import DOCUMENT, Scene, render
 from reference.image import quantise, write_image
 from reference.mistakes import MISTAKES
+from reference.model import pixel_direction
 from reference.world import View
 from reports import gradebook, workers
 from reports.collection import Collection, Entry
@@ -121,6 +123,22 @@ def test_what_is_no_picture_of_the_scene_has_no_false_cause(
     assert picture["verdict"] == "wrong"
     assert not [cause for cause in picture["causes"] if cause["named"]], picture["causes"]
     assert re.search(reason, picture["reason"] + picture["advice"])
+
+
+def test_a_picture_that_lies_aside_is_told_how_far(tmp_path: Path) -> None:
+    """By no known mistake: three quarters of a pixel to the right, sampled at random."""
+    places = np.random.default_rng(8).random((2, SIDE, SIDE))
+    shifted = replace(DOCUMENT, camera_direction=lambda column, row, *size: pixel_direction(column - 3, row, *size))
+    large = np.clip(render(Scene.load(EXAMPLE), shifted, width=4 * SIDE, height=4 * SIDE), 0, 255)
+    rows, columns = np.indices((SIDE, SIDE))
+    down, across = (places * 4).astype(int)
+    picture = large.reshape(SIDE, 4, SIDE, 4, 3)[rows, down, columns, across]
+    Image.fromarray(quantise(picture)).save(tmp_path / "aside.png")
+    crossray("grade", EXAMPLE, "aside.png", "--out", "out", cwd=tmp_path)
+    (found,) = graded(tmp_path / "out")["pictures"]
+    assert found["verdict"] == "wrong"
+    assert re.search(r"0\.[78] pixels too far right: which point of the screen", found["advice"])
+    assert found["features"] == ["geometry"]
 
 
 @pytest.mark.parametrize("name", ["cut_right.png", "cut_right.jpg", "text.png", "empty.png", "missing.png"])
