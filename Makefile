@@ -37,6 +37,7 @@ soundness: $(READY)  ## Prove certified pixels a second time, every one, with Ar
 
 pictures: report browser  ## Draw the pictures of the README
 	$(BIN)/python docs/pictures.py
+	$(BIN)/python docs/grade_pictures.py
 
 docs: $(READY) renderers  ## Write the generated pages of docs/ (minutes)
 	$(BIN)/python docs/scenes.py
