@@ -35,5 +35,7 @@ def look_again(verdict: Verdict, of_scene: Callable[[], Suspects], submission: S
     if np.mean(error > VISIBLE - QUIET) <= SHOWN:
         return verdict
     closest = sorted(suspects.singles, key=lambda single: distance(picture, single.blocks))[:CLOSEST]
-    least = min(distance(picture, suspects.in_file(single, facts)) for single in closest)
-    return replace(verdict, right=False, reasons=("lookalike",)) if least <= LEFT * float(error.sum()) else verdict
+    most = LEFT * float(error.sum())
+    if any(distance(picture, suspects.in_file(single, facts)) <= most for single in closest):
+        return replace(verdict, right=False, reasons=("lookalike",))
+    return verdict
