@@ -65,11 +65,8 @@ class World(Rows):
         self.light_on_sphere = bool(lit.any())
         planes = [(*p.point, 0, *p.unit_normal, p.distance_from(model.light)) for p in scene.planes]
         rows = np.zeros((len(materials), 8))
-        rows[: len(order), :4], rows[: len(order), 4], rows[: len(order), 5] = (
-            np.take(spheres, order, axis=0),
-            lit[order],
-            order,
-        )
+        rows[: len(order), :4] = np.take(spheres, order, axis=0)
+        rows[: len(order), 4], rows[: len(order), 5] = lit[order], order
         rows[len(order) :] = planes or 0
         super().__init__(types, len(order), rows, 8, tree)
         self.listed = upload(self.Index, order.astype(np.uint32)) if tree else None

@@ -50,7 +50,7 @@ def diagnose(suspects: Suspects, levels: NDArray[Any], facts: Facts) -> list[Cau
     What its format alone would do to the right picture is no difference that a cause could explain.
     """
     picture = suspects.blocks_of(levels)
-    again = bool(facts.tables) and levels.shape[:2] == (suspects.view.height, suspects.view.width)
+    again = facts.lossy and levels.shape[:2] == (suspects.view.height, suspects.view.width)
 
     def kept(hypothesis: Hypothesis) -> Levels:
         return suspects.in_file(hypothesis, facts) if again else hypothesis.blocks

@@ -80,11 +80,6 @@ def tiled(excess: NDArray[np.floating[Any]], factor: int) -> NDArray[np.floating
     return np.asarray(rows.reshape(rows.shape[0], rows.shape[1] // factor, factor, channels).max(axis=2))
 
 
-def worst_channel(error: NDArray[Any]) -> NDArray[Any]:
-    """The largest of the three channels at each pixel, six times as fast as NumPy's `max` along so short an axis."""
-    return np.asarray(np.maximum(np.maximum(error[..., 0], error[..., 1]), error[..., 2]))
-
-
 def surroundings(shape: tuple[int, ...], column: int, row: int) -> tuple[int, int, int, int]:
     """Left, top, width and height of what is shown around a pixel of a picture of `shape`."""
     height, width = shape[:2]

@@ -19,7 +19,7 @@ from reference.world import View
 from reports.diagnosis import Cause, diagnose
 from reports.envelope import Envelope, envelope
 from reports.gradebook import Task, empty_record
-from reports.gradeimages import SMALL, THUMB, Album, surroundings, worst_channel
+from reports.gradeimages import SMALL, THUMB, Album, surroundings
 from reports.location import locate
 from reports.lookalike import look_again
 from reports.otherscene import other_scene
@@ -30,7 +30,7 @@ from reports.resemblance import blank, unlike
 from reports.sentences import advise, blame, form, point_aside, praise, where
 from reports.submission import Submission, read_submission
 from reports.suspects import Suspects
-from reports.verdict import OUTSIDE, Blob, Verdict, judge
+from reports.verdict import OUTSIDE, Blob, Verdict, judge, worst_channel
 
 SHARED = "pictures/_right"  # which is no student's
 LISTED = 20  # blobs

@@ -14,7 +14,7 @@ from reference.model import DOCUMENT, Window
 from reference.scene import Scene
 from reference.tracer import render
 from reference.world import View
-from reports.gradeimages import worst_channel
+from reports.verdict import worst_channel
 
 Mask = NDArray[np.bool_]
 

@@ -9,10 +9,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from reports.envelope import Envelope
-from reports.gradeimages import worst_channel
 from reports.registration import LEAST, Displacement
 from reports.submission import Facts
-from reports.verdict import Verdict
+from reports.verdict import Verdict, worst_channel
 
 RIGHT = "Every pixel is one that a right tracer could have made."
 ROUNDED = "Right, with levels rounded that the document truncates: no pixel is off by more than one level."
@@ -38,8 +37,9 @@ def praise(verdict: Verdict) -> str:
 def blame(verdict: Verdict, outside: int, total: int, where: str) -> str:
     """Of a wrong picture: how many pixels, of so many, are wrong, and where."""
     share = f"{outside / total:.2%}".replace(".00%", "%").replace("%", " %")
-    together = ", ".join(TOGETHER.get(reason, "") for reason in verdict.reasons)
-    what = f"are off, {together}" if set(verdict.reasons) <= set(TOGETHER) else "cannot be right"
+    what = "cannot be right"
+    if set(verdict.reasons) <= set(TOGETHER):
+        what = f"are off, {', '.join(TOGETHER[reason] for reason in verdict.reasons)}"
     return f"{outside} of {total} pixels ({share}) {what}, {where}."
 
 

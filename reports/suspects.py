@@ -22,7 +22,7 @@ from reference.scene import Scene
 from reference.slips import draw, missing
 from reference.world import View
 from reports.submission import Facts
-from reports.verdict import store
+from reports.verdict import store, worst_channel
 
 Levels = NDArray[np.float32]
 
@@ -106,7 +106,7 @@ class Suspects:
 
     def _in_file(self, hypothesis: Hypothesis, facts: Facts) -> Levels:
         """What a file with these facts keeps of a hypothesis, in blocks; the last ones are kept."""
-        return blocks(store(hypothesis.whole(), facts), self.block)
+        return blocks(store(hypothesis.whole(), facts), self.block) if facts.lossy else hypothesis.blocks
 
     @cached_property
     def right_whole(self) -> Levels:
@@ -171,5 +171,4 @@ def distance(one: Levels, other: Levels) -> float:
 
 def off(error: Levels) -> NDArray[np.float32]:
     """What counts of the error of each block."""
-    worst = np.maximum(np.maximum(error[..., 0], error[..., 1]), error[..., 2])
-    return np.asarray(np.minimum(np.maximum(worst - QUIET, 0), MOST), np.float32)
+    return np.asarray(np.minimum(np.maximum(worst_channel(error) - QUIET, 0), MOST), np.float32)

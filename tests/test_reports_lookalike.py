@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +29,9 @@ VIEW = View(250, 250, 3)
 Verdicts = tuple[Verdict, Verdict]
 
 
+photo = partial(jpeg, quality=85, subsampling="4:2:0")
+
+
 @cache
 def bounds(name: str) -> Envelope:
     return envelope(scenes()[name], VIEW.width, VIEW.height)
@@ -50,9 +53,9 @@ def verdicts(name: str, picture: Submission) -> Verdicts:
     [
         ("tangent", "C5", png),
         ("eye_inside", "C4", png),
-        ("example4", "R7", lambda pixels: jpeg(pixels, 85, "4:2:0")),
-        ("near_front", "Q2", lambda pixels: jpeg(pixels, 85, "4:2:0")),
-        ("bright_ambient", "C5", lambda pixels: jpeg(pixels, 85, "4:2:0")),
+        ("example4", "R7", photo),
+        ("near_front", "Q2", photo),
+        ("bright_ambient", "C5", photo),
     ],
 )
 def test_hidden_mistakes_are_told(name: str, key: str, file: Callable[[object], Submission]) -> None:
