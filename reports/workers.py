@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Lock, Thread, Timer
+from threading import Event, Lock, Thread, Timer
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -53,7 +53,13 @@ class _Worker:
 
     def do(self, job: Any, timeout: float) -> dict[str, Any] | Failed:
         """The answer, or why there is none; the process is then gone."""
-        late = Timer(timeout, self.process.kill)
+        expired = Event()
+
+        def expire() -> None:
+            expired.set()
+            self.process.kill()
+
+        late = Timer(timeout, expire)
         late.daemon = True
         late.start()
         line = b""
@@ -62,16 +68,16 @@ class _Worker:
             self.tasks.write(len(data).to_bytes(8, "little") + data)
             self.tasks.flush()
             line = self.answers.readline()
-        in_time = late.is_alive()
         late.cancel()
-        if line.endswith(b"\n"):
+        late.join()  # from here on nothing kills the process but us
+        if line.endswith(b"\n") and not expired.is_set():
             answer: dict[str, Any] = json.loads(line)
             return answer
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(LONGEST_ENDING)
         self.process.kill()
         code = self.process.wait()
-        if not in_time:
+        if expired.is_set():
             return Failed(f"it took more than {timeout:g} s")
         return Failed(f"the process that graded it {_ending(code)}{self._last_words()}")
 

@@ -29,6 +29,19 @@ class Poison:
         return self.action, self.arguments
 
 
+class Late:
+    """A pipe whose line is read, and then it takes until the process is killed."""
+
+    def __init__(self, pipe: Any) -> None:
+        self.pipe, self.close = pipe, pipe.close
+
+    def readline(self) -> bytes:
+        line: bytes = self.pipe.readline()
+        assert line.endswith(b"\n")
+        self.pipe.read()
+        return line
+
+
 def missing(folder: Path) -> Task:
     """A harmless task, quickly done."""
     entry = Entry("anna", "example1", folder / "missing.png")
@@ -53,6 +66,15 @@ def test_a_job_that_hangs_is_ended(tmp_path: Path) -> None:
     answers = dict(run_jobs(jobs, "ab", workers=2, threads=1, timeout=8))
     assert answers[0] == Failed("it took more than 8 s")
     assert not isinstance(answers[1], Failed)
+
+
+def test_an_answer_that_comes_as_the_time_ends_is_late(tmp_path: Path) -> None:
+    worker = workers._Worker(1)
+    try:
+        worker.answers = Late(worker.answers)  # type: ignore[assignment]
+        assert worker.do(missing(tmp_path), 10) == Failed("it took more than 10 s")
+    finally:
+        worker.end()
 
 
 def test_an_unforeseen_error_is_told_and_the_worker_goes_on(tmp_path: Path) -> None:
@@ -83,7 +105,7 @@ def test_a_swollen_worker_is_replaced(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_closing_ends_every_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    processes = []
+    processes, before = [], set(threading.enumerate())
     start = workers._Worker.__init__
 
     def kept(self: Any, threads: int) -> None:
@@ -96,7 +118,7 @@ def test_closing_ends_every_process(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     next(answers)
     answers.close()
     assert {process.poll() for process in processes} == {-signal.SIGKILL}
-    assert threading.active_count() == 1
+    assert set(threading.enumerate()) <= before
 
 
 def test_topics_stay_with_their_worker() -> None:
